@@ -55,8 +55,8 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         .iter()
         .map(|session| {
             let robot = session.robot;
-            let lengths_m = [robot.left_wheel_diameter_m, robot.right_wheel_diameter_m, robot.wheel_separation_m];
-            lengths_m.map(|length_m| format!("{:.3}", 1e3 * length_m)).join(", ")
+            let geometry_m = [robot.left_wheel_diameter_m, robot.right_wheel_diameter_m, robot.wheel_separation_m];
+            geometry_m.map(|length_m| format!("{:.3}", 1e3 * length_m)).join(", ")
         })
         .collect();
     if let Some(out) = &arguments.out_dir {

@@ -82,16 +82,16 @@ fn of_dataset(
     let options_of = EvaluationOptions::default();
     let nominal = evaluate_runs(&raw, None, &options_of, &mut 0.0);
     let offline = evaluate_runs(&records, Some(given.calibration()), &options_of, &mut 0.0);
-    let on_board = |is_told: bool| on_board(robot, &given, (&dataset, &records), options, is_told);
+    let on_board = |is_logged: bool| on_board(robot, &given, (&dataset, &records), options, is_logged);
     let summary = |runs| CalibrationDrift::of_runs(None, runs);
-    let told = summary(on_board(true)?);
+    let logged = summary(on_board(true)?);
     let untold = robot.needs_inputs().then(|| on_board(false)).transpose()?.map(summary);
     Ok(Drift {
         nominal: summary(nominal).drift_percent,
-        on_board: told.drift_percent,
+        on_board: logged.drift_percent,
         on_board_untold: untold.and_then(|untold| untold.drift_percent),
         offline: summary(offline).drift_percent,
-        why_null: told.why_null,
+        why_null: logged.why_null,
     })
 }
 
@@ -101,7 +101,7 @@ fn on_board(
     given: &GivenCalibration,
     (dataset, records): (&Dataset, &Session<'_>),
     options: &Options,
-    is_told: bool,
+    is_logged: bool,
 ) -> Result<Vec<RunDrift>, Failure> {
     let mut driven_m = 0.0;
     let mut all = Vec::with_capacity(records.runs.len());
@@ -115,7 +115,7 @@ fn on_board(
             &options_of,
             &mut driven_m,
             |world_from_body, session_m| {
-                let start = LogStart { world_from_body, session_m, is_told };
+                let start = LogStart { world_from_body, session_m, is_logged };
                 let path = robot.on_board_path(raw, options.counter_bits, &start);
                 let mut path = path.unwrap_or_else(|error| {
                     failed = Some(error);

@@ -131,12 +131,12 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
 }
 
 fn import(arguments: &Arguments, out: &Path, terminal: &Terminal) -> Result<(), Failure> {
-    let asked = |error: RosBagError| match &error {
+    let as_question = |error: RosBagError| match &error {
         RosBagError::Dataset(missing) => with_command_line(missing).unwrap_or_else(|| error.into()),
         _ => error.into(),
     };
     let FromBag { mut dataset, took, warnings } =
-        ros_bag::import(&arguments.bag, &arguments.options()?).map_err(asked)?;
+        ros_bag::import(&arguments.bag, &arguments.options()?).map_err(as_question)?;
     arguments.robot.identity.state_in(&mut dataset.provenance);
     let gyro = took.gyro.iter().map(|gyro| ("gyro", "--gyro", gyro));
     let both = [("wheels", "--wheels", &took.wheels), ("truth", "--truth", &took.truth)];

@@ -135,9 +135,9 @@ impl Page<'_> {
     }
 
     fn alternatives(&self, page: &mut String) -> std::fmt::Result {
-        let asked = self.alternatives.iter().filter(|alternative| alternative.status != Status::NotDetectable);
+        let detectable = self.alternatives.iter().filter(|alternative| alternative.status != Status::NotDetectable);
         let (standing, others): (Vec<_>, Vec<_>) =
-            asked.partition(|alternative| alternative.status != Status::NotSignificant);
+            detectable.partition(|alternative| alternative.status != Status::NotSignificant);
         if standing.is_empty() && others.is_empty() {
             return Ok(());
         }

@@ -113,8 +113,8 @@ impl DiagnosisPage<'_> {
                 let further = document.findings.len() - 1;
                 let further =
                     if further > 0 { format!("; and {}", count(further, "further finding")) } else { String::new() };
-                let sure = format!("{:.0} % sure{further}", 100.0 * first.probability);
-                tiles.push(tile("Cause", cause(first), sure, "finding"));
+                let confidence = format!("{:.0} % sure{further}", 100.0 * first.probability);
+                tiles.push(tile("Cause", cause(first), confidence, "finding"));
                 let size = size(first).map_or_else(
                     || {
                         tile(

@@ -16,9 +16,9 @@ fn meaning(id: &str) -> String {
 
 /// Which other causes were tried, and what speaks against them.
 pub(super) fn alternatives(alternatives: &[Alternative], document: &Document) -> Section {
-    let asked = alternatives.iter().filter(|alternative| alternative.status != Status::NotDetectable);
+    let detectable = alternatives.iter().filter(|alternative| alternative.status != Status::NotDetectable);
     let (standing, others): (Vec<_>, Vec<_>) =
-        asked.partition(|alternative| alternative.status != Status::NotSignificant);
+        detectable.partition(|alternative| alternative.status != Status::NotSignificant);
     let mut section = Section::new("alternatives", "What else could it be?");
     for finding in document.findings.iter().filter(|finding| finding.names.len() > 1) {
         let names: Vec<String> = finding.names.iter().map(|id| format!("{id} ({})", meaning(id))).collect();

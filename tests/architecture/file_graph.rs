@@ -400,7 +400,7 @@ fn colons(cursor: Cursor<'_>) -> Option<Cursor<'_>> {
 /// Each circle with its files and, for each arrow, one item that makes it.
 fn circles(graph: &Graph) -> Vec<String> {
     let reached: BTreeMap<&str, BTreeSet<&str>> =
-        graph.keys().map(|file| (file.as_str(), reach(graph, file))).collect();
+        graph.keys().map(|file| (file.as_str(), reachable(graph, file))).collect();
     let mut done = BTreeSet::new();
     let mut found = Vec::new();
     for (&file, beyond) in &reached {
@@ -423,7 +423,7 @@ fn circles(graph: &Graph) -> Vec<String> {
 }
 
 /// Every file to which arrows lead from a file.
-fn reach<'g>(graph: &'g Graph, from: &str) -> BTreeSet<&'g str> {
+fn reachable<'g>(graph: &'g Graph, from: &str) -> BTreeSet<&'g str> {
     let mut reached = BTreeSet::new();
     let mut open = vec![from];
     while let Some(file) = open.pop() {

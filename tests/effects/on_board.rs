@@ -124,13 +124,13 @@ fn rmse_m(runs: Vec<calib::RunDrift>) -> f64 {
 }
 
 /// Root of the mean square error of the position along the runs, metres, by what runs on board.
-fn on_board_m(dataset: &Dataset, model: &ExtendedModel, robot: &CalibratedRobot, is_told: bool) -> f64 {
+fn on_board_m(dataset: &Dataset, model: &ExtendedModel, robot: &CalibratedRobot, is_logged: bool) -> f64 {
     let (records, _) = model.undone(dataset).expect("undone");
     let session = records.session();
     let mut driven_m = 0.0;
     let of = |(run, raw): (&dataset::RunView<'_>, &dataset::Run)| {
         evaluate_path(&session, run, &model.calibration, &options(), &mut driven_m, |world_from_body, session_m| {
-            let start = LogStart { world_from_body, session_m, is_told };
+            let start = LogStart { world_from_body, session_m, is_logged };
             let mut path = robot.on_board_path(raw, None, &start).expect("a drive")?;
             path.iter_mut().zip(&run.odometry().t_s).for_each(|((at_s, _), t_s)| *at_s = *t_s);
             Some(path)
@@ -195,7 +195,7 @@ fn an_odometry_with_the_effect_is_nearer_to_the_truth_than_without() {
         if robot.needs_inputs() {
             let untold_m = on_board_m(&dataset, &with, &robot, false);
             if (untold_m - without_m).abs() > 1e-9 {
-                complaints.push(format!("{id}: told nothing {untold_m} m, without it {without_m} m"));
+                complaints.push(format!("{id}: logged nothing {untold_m} m, without it {without_m} m"));
             }
         }
     }

@@ -29,13 +29,13 @@ fn calibrated(dataset: &Dataset) -> Calibration {
 /// The relative value of a combination of left, right and separation, and its standard deviation.
 fn combined(found: &Calibration, by: [f64; 3]) -> (f64, f64) {
     let diameter_m = found.geometry.wheel_diameter_m();
-    let lengths_m = [diameter_m.left, diameter_m.right, found.geometry.wheel_separation_m()];
+    let geometry_m = [diameter_m.left, diameter_m.right, found.geometry.wheel_separation_m()];
     let covariance = found.covariance.as_ref().expect("a covariance");
     let variance: f64 = (0..9)
         .map(|k| (k / 3, k % 3))
-        .map(|(i, j)| by[i] * by[j] * covariance[(i, j)] / (lengths_m[i] * lengths_m[j]))
+        .map(|(i, j)| by[i] * by[j] * covariance[(i, j)] / (geometry_m[i] * geometry_m[j]))
         .sum();
-    (by.iter().zip(lengths_m).map(|(by, length_m)| by * length_m.ln()).sum(), variance.sqrt())
+    (by.iter().zip(geometry_m).map(|(by, length_m)| by * length_m.ln()).sum(), variance.sqrt())
 }
 
 #[test]

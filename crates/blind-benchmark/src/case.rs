@@ -103,7 +103,7 @@ pub(crate) struct Case {
 enum Attempt {
     Ready(Box<Case>),
     /// Its paths do not show what is hidden.
-    Unseen,
+    Undetectable,
     /// They would, but for the rounding of its encoder.
     Unresolved,
 }
@@ -134,7 +134,7 @@ impl Case {
             match Self::attempt(seed, number, case_kind, &ids, attempt)? {
                 Attempt::Ready(case) => return Ok(Ok(Self { unresolved_robots, ..*case })),
                 Attempt::Unresolved => unresolved_robots += 1,
-                Attempt::Unseen => {}
+                Attempt::Undetectable => {}
             }
         }
         Ok(Err(Self::ids(seed, number, case_kind, index, 0).first().copied().unwrap_or("")))
@@ -147,11 +147,11 @@ impl Case {
         let all = hideable();
         let of =
             |kind: EffectKind| all.iter().filter(move |(_, of)| *of == kind).map(|(id, _)| *id).collect::<Vec<_>>();
-        let mut one = |gross: f64, scatter: f64| {
+        let mut one = |record_fault: f64, scatter: f64| {
             let uniform = draw.uniform(0.0, 1.0);
-            let list = of(if uniform < gross {
-                EffectKind::Gross
-            } else if uniform < gross + scatter {
+            let list = of(if uniform < record_fault {
+                EffectKind::RecordFault
+            } else if uniform < record_fault + scatter {
                 EffectKind::Scatter
             } else {
                 EffectKind::Mean
@@ -189,7 +189,7 @@ impl Case {
         let mut draw = draws.of("hidden");
         let mut hidden = Vec::new();
         for id in ids {
-            let Some(effect) = Hidden::draw(id, &robot, &mut draw) else { return Ok(Attempt::Unseen) };
+            let Some(effect) = Hidden::draw(id, &robot, &mut draw) else { return Ok(Attempt::Undetectable) };
             hidden.push(effect);
         }
         let measurement =
@@ -200,29 +200,31 @@ impl Case {
             CaseKind::Large => LARGE_RATIOS,
             CaseKind::Null | CaseKind::Single | CaseKind::LeftOut => SINGLE_RATIOS,
         };
-        let weak = hidden.iter().any(|hidden| hidden.kind != EffectKind::Gross);
+        let weak = hidden.iter().any(|hidden| hidden.kind != EffectKind::RecordFault);
         let plain = if weak { drive(&robot.sessions, &measurement, &[], false, 0)? } else { Vec::new() };
         let noise = TrueNoise::of(&conditions, &instrument_model, mean_square_motion(&plain));
         let (mut detectability, mut rounding_shares) = (Vec::new(), Vec::new());
         for effect in &mut hidden {
-            let seen = |effect: &Hidden, noise: TrueNoise| -> Result<Option<Detectability>, ChallengeError> {
+            let measured = |effect: &Hidden, noise: TrueNoise| -> Result<Option<Detectability>, ChallengeError> {
                 let exact = drive(&robot.sessions, &measurement, &[effect], false, 0)?;
                 Ok(Detectability::of(&exact, &plain, &truth, noise))
             };
-            match scale(effect, &mut draw, ratios, |effect| seen(effect, noise))? {
-                Chosen::Gross => detectability.push(None),
+            match scale(effect, &mut draw, ratios, |effect| measured(effect, noise))? {
+                Chosen::RecordFault => detectability.push(None),
                 Chosen::Detectability(found) => detectability.push(Some(*found)),
-                Chosen::Unseen => {
-                    return Ok(match seen(effect, noise.without_rounding()) {
+                Chosen::Undetectable => {
+                    return Ok(match measured(effect, noise.without_rounding()) {
                         Ok(Some(unrounded)) if is_unresolved(effect, &unrounded, noise) => Attempt::Unresolved,
-                        _ => Attempt::Unseen,
+                        _ => Attempt::Undetectable,
                     });
                 }
             }
             rounding_shares.push(match detectability.last() {
-                Some(Some(found)) if noise.has_rounding() => seen(effect, noise.without_rounding())?.map(|unrounded| {
-                    1.0 - known_noncentrality(effect, found) / known_noncentrality(effect, &unrounded)
-                }),
+                Some(Some(found)) if noise.has_rounding() => {
+                    measured(effect, noise.without_rounding())?.map(|unrounded| {
+                        1.0 - known_noncentrality(effect, found) / known_noncentrality(effect, &unrounded)
+                    })
+                }
                 _ => None,
             });
         }
@@ -309,9 +311,9 @@ pub(crate) struct FurtherRuns {
 }
 
 enum Chosen {
-    Gross,
+    RecordFault,
     Detectability(Box<Detectability>),
-    Unseen,
+    Undetectable,
 }
 
 /// Sets a scale at which the effect is as large as drawn, in units of the oracle's detection limit.
@@ -319,18 +321,18 @@ fn scale(
     effect: &mut Hidden,
     draw: &mut Draw,
     (low, high): (f64, f64),
-    seen: impl Fn(&Hidden) -> Result<Option<Detectability>, ChallengeError>,
+    measured: impl Fn(&Hidden) -> Result<Option<Detectability>, ChallengeError>,
 ) -> Result<Chosen, ChallengeError> {
-    if effect.kind == EffectKind::Gross {
-        return Ok(Chosen::Gross);
+    if effect.kind == EffectKind::RecordFault {
+        return Ok(Chosen::RecordFault);
     }
     effect.scale = effect.most.min(1.0);
-    let Some(first) = seen(effect)? else { return Ok(Chosen::Unseen) };
+    let Some(first) = measured(effect)? else { return Ok(Chosen::Undetectable) };
     let at_first = size_ratio(effect, &first);
     // The largest that a real robot may have must reach the limit, or the paths do not show the effect.
     let most = at_first * effect.most / effect.scale;
     if most.is_nan() || most <= low.max(1.0) {
-        return Ok(Chosen::Unseen);
+        return Ok(Chosen::Undetectable);
     }
     let wanted = draw.log_uniform(low, high.min(most));
     let mut found = (first, at_first);
@@ -344,12 +346,12 @@ fn scale(
         let before = (effect.scale, found.1);
         effect.scale = (effect.scale * off.powf(1.0 / growth).clamp(1e-3, 1e3)).min(effect.most);
         if effect.act().is_none() {
-            return Ok(Chosen::Unseen);
+            return Ok(Chosen::Undetectable);
         }
-        let Some(next) = seen(effect)? else { return Ok(Chosen::Unseen) };
+        let Some(next) = measured(effect)? else { return Ok(Chosen::Undetectable) };
         let at_next = size_ratio(effect, &next);
         if at_next.is_nan() || at_next <= 0.0 {
-            return Ok(Chosen::Unseen);
+            return Ok(Chosen::Undetectable);
         }
         let slope = (at_next / before.1).ln() / (effect.scale / before.0).ln();
         growth = if slope.is_finite() { slope.clamp(0.3, 6.0) } else { 1.0 };
@@ -368,7 +370,11 @@ fn scale(
     };
     let of_its_kind = !effect.other_form || (form_share(effect, &found.0) > MIN_SHARE && !described_better());
     let of_its_own = effect.kind == EffectKind::Scatter || !found.0.is_explained_by_geometry();
-    if close && of_its_kind && of_its_own { Ok(Chosen::Detectability(Box::new(found.0))) } else { Ok(Chosen::Unseen) }
+    if close && of_its_kind && of_its_own {
+        Ok(Chosen::Detectability(Box::new(found.0)))
+    } else {
+        Ok(Chosen::Undetectable)
+    }
 }
 
 /// Whether an effect at its scale would show, were it not for the rounding.

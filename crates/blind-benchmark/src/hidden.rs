@@ -22,7 +22,7 @@ pub enum EffectKind {
     /// It scatters.
     Scatter,
     /// It spoils the records.
-    Gross,
+    RecordFault,
 }
 
 /// Ids that can be hidden, with their kinds: the catalogue without the geometry, what is silent,
@@ -35,7 +35,7 @@ pub(crate) fn hideable() -> Vec<(&'static str, EffectKind)> {
         .filter_map(|id| match hypothesis(id)? {
             Hypothesis::Terms(_) => Some((*id, EffectKind::Mean)),
             Hypothesis::Scatter(_) | Hypothesis::TermsAndScatter(..) => Some((*id, EffectKind::Scatter)),
-            Hypothesis::Records(_) => Some((*id, EffectKind::Gross)),
+            Hypothesis::Records(_) => Some((*id, EffectKind::RecordFault)),
             Hypothesis::Geometry | Hypothesis::UnknownMotion { .. } | Hypothesis::Silent => None,
         })
         .collect()

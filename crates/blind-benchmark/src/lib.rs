@@ -137,14 +137,14 @@ pub fn challenge(
 ) -> Result<ChallengeResult, ChallengeError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build();
     let pool = pool.map_err(|error| ChallengeError::Threads { jobs, why: error.to_string() })?;
-    let is_asked = |number: &u64| scope != Scope::Guarded || case::is_guarded(*number);
+    let is_included = |number: &u64| scope != Scope::Guarded || case::is_guarded(*number);
     let one = |number| {
         let result = challenge_case(scope, seed, number);
         done();
         result
     };
     let results: Vec<Result<CaseResult, &'static str>> =
-        pool.install(|| (0..cases).into_par_iter().filter(is_asked).map(one).collect::<Result<_, _>>())?;
+        pool.install(|| (0..cases).into_par_iter().filter(is_included).map(one).collect::<Result<_, _>>())?;
     let (mut scored, mut never_shown) = (Vec::new(), BTreeMap::new());
     for result in results {
         match result {

@@ -23,7 +23,7 @@ const PAIR_RATIO: f64 = 1.6;
 
 /// What was said of one hidden effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum NamingOutcome {
+enum IdentificationOutcome {
     Undetected,
     First,
     InSet,
@@ -32,18 +32,18 @@ enum NamingOutcome {
     WrongSet,
 }
 
-fn naming_outcome(hidden: &OracleView, first: Option<&Reported>) -> NamingOutcome {
-    let Some(reported) = first else { return NamingOutcome::Undetected };
+fn identification_outcome(hidden: &OracleView, first: Option<&Reported>) -> IdentificationOutcome {
+    let Some(reported) = first else { return IdentificationOutcome::Undetected };
     if reported.names[0] == hidden.id {
-        NamingOutcome::First
+        IdentificationOutcome::First
     } else if reported.names.contains(&hidden.id) {
-        NamingOutcome::InSet
+        IdentificationOutcome::InSet
     } else if reported.names[0] == "unlisted" {
-        NamingOutcome::Unlisted
+        IdentificationOutcome::Unlisted
     } else if reported.names.len() == 1 {
-        NamingOutcome::WrongName
+        IdentificationOutcome::WrongName
     } else {
-        NamingOutcome::WrongSet
+        IdentificationOutcome::WrongSet
     }
 }
 
@@ -51,7 +51,7 @@ fn is_aliased(hidden: &OracleView) -> bool {
     match hidden.kind {
         EffectKind::Mean => !hidden.aliases.is_empty(),
         EffectKind::Scatter => !hidden.aliases.is_empty() || hidden.ratio.is_none_or(|ratio| ratio < CLEAR_RATIO),
-        EffectKind::Gross => false,
+        EffectKind::RecordFault => false,
     }
 }
 
@@ -66,20 +66,20 @@ pub(crate) fn measures(seed: u64, cases: &[CaseResult]) -> Vec<Measure> {
 
 pub(crate) fn measures_with(seed: u64, cases: &[CaseResult], bar_of_nulls: f64) -> Vec<Measure> {
     let of = |case_kind: CaseKind| cases.iter().filter(move |case| case.case_kind == case_kind);
-    let alarm = |case: &CaseResult| case.findings().next().is_some();
+    let has_finding = |case: &CaseResult| case.findings().next().is_some();
     let mut measures = vec![
-        share("null_findings", "nulls with a finding", count(of(CaseKind::Null), alarm), bar_of_nulls, true),
+        share("null_findings", "nulls with a finding", count(of(CaseKind::Null), has_finding), bar_of_nulls, true),
         share(
             "false_alarms",
             "nulls with a false positive",
-            count(of(CaseKind::Null).filter(|case| case.noise == NoiseClass::White), alarm),
+            count(of(CaseKind::Null).filter(|case| case.noise == NoiseClass::White), has_finding),
             0.05,
             true,
         ),
         share(
             "false_alarms_other_noise",
             "nulls with a false positive, other noise",
-            count(of(CaseKind::Null).filter(|case| case.noise != NoiseClass::White), alarm),
+            count(of(CaseKind::Null).filter(|case| case.noise != NoiseClass::White), has_finding),
             0.10,
             true,
         ),
@@ -167,9 +167,9 @@ fn detected(cases: &[CaseResult]) -> Measure {
 /// Whether the right name is first, of a detected single effect without an alias.
 pub(crate) fn is_first_name_right(case: &CaseResult) -> Option<bool> {
     let hidden = case.hidden.first().filter(|hidden| case.case_kind == CaseKind::Single && !is_aliased(hidden))?;
-    match naming_outcome(hidden, case.findings().next()) {
-        NamingOutcome::Undetected => None,
-        outcome => Some(outcome == NamingOutcome::First),
+    match identification_outcome(hidden, case.findings().next()) {
+        IdentificationOutcome::Undetected => None,
+        outcome => Some(outcome == IdentificationOutcome::First),
     }
 }
 
@@ -191,14 +191,14 @@ fn unresolved(cases: &[CaseResult]) -> Measure {
 }
 
 fn names(cases: &[CaseResult]) -> Vec<Measure> {
-    let singles: Vec<(&OracleView, NamingOutcome, &CaseResult)> = cases
+    let singles: Vec<(&OracleView, IdentificationOutcome, &CaseResult)> = cases
         .iter()
         .filter(|case| case.case_kind == CaseKind::Single)
         .filter_map(|case| {
             let hidden = case.hidden.first()?;
-            Some((hidden, naming_outcome(hidden, case.findings().next()), case))
+            Some((hidden, identification_outcome(hidden, case.findings().next()), case))
         })
-        .filter(|(_, naming_outcome, _)| *naming_outcome != NamingOutcome::Undetected)
+        .filter(|(_, identification_outcome, _)| *identification_outcome != IdentificationOutcome::Undetected)
         .collect();
     let plain = singles.iter().filter(|(hidden, _, _)| !is_aliased(hidden));
     let aliased = || singles.iter().filter(|(hidden, _, _)| is_aliased(hidden));
@@ -206,15 +206,15 @@ fn names(cases: &[CaseResult]) -> Vec<Measure> {
         share(
             "first_name",
             "right name first",
-            count(plain, |(_, naming_outcome, _)| *naming_outcome == NamingOutcome::First),
+            count(plain, |(_, identification_outcome, _)| *identification_outcome == IdentificationOutcome::First),
             0.95,
             false,
         ),
         share(
             "set_holds",
             "aliased: the set holds the right name",
-            count(aliased(), |(_, naming_outcome, _)| {
-                matches!(naming_outcome, NamingOutcome::First | NamingOutcome::InSet)
+            count(aliased(), |(_, identification_outcome, _)| {
+                matches!(identification_outcome, IdentificationOutcome::First | IdentificationOutcome::InSet)
             }),
             0.98,
             false,
@@ -222,7 +222,9 @@ fn names(cases: &[CaseResult]) -> Vec<Measure> {
         share(
             "single_wrong_name",
             "aliased: a single wrong name",
-            count(aliased(), |(_, naming_outcome, _)| *naming_outcome == NamingOutcome::WrongName),
+            count(aliased(), |(_, identification_outcome, _)| {
+                *identification_outcome == IdentificationOutcome::WrongName
+            }),
             0.01,
             true,
         ),

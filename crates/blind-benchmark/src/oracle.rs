@@ -120,7 +120,7 @@ impl TrueNoise {
 /// Half of the χ² of noise-free runs under a model with terms: what the model costs of the log score, on
 /// average over the measurements' errors.
 pub(crate) fn misfit(datasets: &[Dataset], model: &Model, noise: TrueNoise, terms: &mut [Box<dyn ModelTerm>]) -> f64 {
-    measurement(datasets, model, noise, terms).map_or(0.0, |seen| 0.5 * seen.total.chi_square)
+    measurement(datasets, model, noise, terms).map_or(0.0, |measured| 0.5 * measured.total.chi_square)
 }
 
 /// The same with the geometry parameters and the terms' sizes at their best for these runs, from those of the
@@ -135,9 +135,9 @@ pub(crate) fn misfit_of_form(
         Column::GEOMETRY.into_iter().chain((0..model.term_values.len()).map(Column::Term)).collect();
     let (mut model, mut least) = (model.clone(), f64::INFINITY);
     for _ in 0..=GAUSS_NEWTON_STEPS {
-        let Some(seen) = measurement(datasets, &model, noise, terms) else { return least };
-        least = least.min(0.5 * seen.total.chi_square);
-        let Some((step, _)) = seen.total.of(&columns).solve() else { return least };
+        let Some(measured) = measurement(datasets, &model, noise, terms) else { return least };
+        least = least.min(0.5 * measured.total.chi_square);
+        let Some((step, _)) = measured.total.of(&columns).solve() else { return least };
         columns.iter().zip(step.iter()).for_each(|(column, by)| model.advance(*column, *by));
     }
     least
@@ -213,21 +213,21 @@ impl Detectability {
         let mut model = Model::of(truth, at - Column::BASE.len());
         let plain = measurement(without, &model, noise, &mut terms)?;
         let mut at_truth = None;
-        let mut seen = measurement(datasets, &model, noise, &mut terms)?;
+        let mut measured = measurement(datasets, &model, noise, &mut terms)?;
         for _ in 0..GAUSS_NEWTON_STEPS {
-            at_truth.get_or_insert(seen.total.chi_square);
-            let step = to_best_geometry(&seen.total, &free)?;
+            at_truth.get_or_insert(measured.total.chi_square);
+            let step = to_best_geometry(&measured.total, &free)?;
             Column::GEOMETRY.iter().zip(step.iter()).for_each(|(column, by)| model.advance(*column, *by));
-            seen = measurement(datasets, &model, noise, &mut terms)?;
+            measured = measurement(datasets, &model, noise, &mut terms)?;
         }
-        if seen.z.len() == plain.z.len() {
-            seen.total.gradient -= &plain.total.gradient;
-            seen.z.iter_mut().zip(&plain.z).for_each(|(seen, plain)| seen.1 -= plain.1);
-            seen.total.chi_square = seen.z.iter().map(|(_, z)| z * z).sum();
+        if measured.z.len() == plain.z.len() {
+            measured.total.gradient -= &plain.total.gradient;
+            measured.z.iter_mut().zip(&plain.z).for_each(|(measured, plain)| measured.1 -= plain.1);
+            measured.total.chi_square = measured.z.iter().map(|(_, z)| z * z).sum();
         }
         let at_truth = at_truth.unwrap_or(0.0);
         let best = Model { term_values: Vec::new(), ..model };
-        Some(Self { scatter: scatter(&seen.z), total: seen.total, at_truth, best, candidates, free })
+        Some(Self { scatter: scatter(&measured.z), total: measured.total, at_truth, best, candidates, free })
     }
 
     /// How much of χ² the geometry parameters and some candidates take up at their best, and the candidates'

@@ -84,7 +84,7 @@ fn rounds_take_turns_and_leave_every_effect_out_once() {
     let is_event = |id: &&&str| matches!(effects::hypothesis(id), Some(effects::Hypothesis::UnknownMotion { .. }));
     assert_eq!(all.len(), effects::CATALOGUE.len() - 5 - effects::CATALOGUE.iter().filter(is_event).count());
     assert!(
-        [EffectKind::Mean, EffectKind::Scatter, EffectKind::Gross]
+        [EffectKind::Mean, EffectKind::Scatter, EffectKind::RecordFault]
             .iter()
             .all(|kind| all.iter().any(|(_, of)| of == kind))
     );

@@ -342,8 +342,8 @@ pub(crate) fn nominal(
 }
 
 /// Covariance of diameters and separation (m²) from that of their relative changes, by row and column.
-pub(crate) fn covariance_of_lengths(relative: impl Fn(usize, usize) -> f64, lengths_m: [f64; 3]) -> Covariance {
-    Covariance::from_fn(3, 3, |row, column| relative(row, column) * lengths_m[row] * lengths_m[column])
+pub(crate) fn geometry_covariance(relative: impl Fn(usize, usize) -> f64, geometry_m: [f64; 3]) -> Covariance {
+    Covariance::from_fn(3, 3, |row, column| relative(row, column) * geometry_m[row] * geometry_m[column])
 }
 
 /// A drive from its estimated geometry.

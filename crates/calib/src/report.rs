@@ -347,14 +347,14 @@ impl NamedCalibration {
     #[must_use]
     pub fn implausible_for(&self, robot: &NominalRobot) -> Option<String> {
         let found = self.geometry(robot, robot.geometry().ok()?)?;
-        let lengths = [
+        let parameters = [
             (Parameter::LeftWheelDiameter, found.wheel_diameter_m().left, robot.left_wheel_diameter_m),
             (Parameter::RightWheelDiameter, found.wheel_diameter_m().right, robot.right_wheel_diameter_m),
             (Parameter::WheelSeparation, found.wheel_separation_m(), robot.wheel_separation_m),
         ];
         let off =
             |&(parameter, found_m, nominal_m): &(Parameter, f64, f64)| is_implausible(parameter, found_m / nominal_m);
-        let (parameter, found_m, nominal_m) = lengths.into_iter().find(off)?;
+        let (parameter, found_m, nominal_m) = parameters.into_iter().find(off)?;
         Some(format!("{} is {found_m:.4} where the dataset states {nominal_m:.4}", parameter.key()))
     }
 
@@ -362,7 +362,7 @@ impl NamedCalibration {
     #[must_use]
     pub fn other_robot(&self, robot: &NominalRobot) -> Option<String> {
         let found = self.geometry(robot, robot.geometry().ok()?)?;
-        let lengths = [
+        let parameters = [
             (Parameter::LeftWheelDiameter, found.wheel_diameter_m().left, robot.left_wheel_diameter_m),
             (Parameter::RightWheelDiameter, found.wheel_diameter_m().right, robot.right_wheel_diameter_m),
             (Parameter::WheelSeparation, found.wheel_separation_m(), robot.wheel_separation_m),
@@ -375,7 +375,7 @@ impl NamedCalibration {
             };
             (found_m / nominal_m).ln().abs() > most.ln()
         };
-        let (parameter, found_m, nominal_m) = lengths.into_iter().find(off)?;
+        let (parameter, found_m, nominal_m) = parameters.into_iter().find(off)?;
         Some(format!(
             "{} is {:.2} mm where the dataset states {:.2} mm",
             parameter.key(),

@@ -338,14 +338,14 @@ mod tests {
         all
     }
 
-    fn beat(stamps: &[(f64, f64, i64)]) -> SamplingPeriod {
+    fn period_of(stamps: &[(f64, f64, i64)]) -> SamplingPeriod {
         let t_s: Vec<f64> = stamps.iter().map(|(t_s, ..)| *t_s).collect();
         SamplingPeriod::of(&t_s).expect("a beat")
     }
 
     /// Root mean square of what lateness is off from what it was, its mean apart.
     fn off_s(stamps: &[(f64, f64, i64)]) -> f64 {
-        let found = beat(stamps).late_s;
+        let found = period_of(stamps).late_s;
         let off: Vec<f64> = found.iter().zip(stamps).map(|(found, (_, late_s, _))| found - late_s).collect();
         let mean = off.iter().sum::<f64>() / off.len() as f64;
         (off.iter().map(|off| (off - mean).powi(2)).sum::<f64>() / off.len() as f64).sqrt()
@@ -353,7 +353,7 @@ mod tests {
 
     /// Share of the steps from row to row of which the number is wrong.
     fn wrong_steps(stamps: &[(f64, f64, i64)]) -> f64 {
-        let found = beat(stamps).numbers;
+        let found = period_of(stamps).numbers;
         let pairs = found.windows(2).zip(stamps.windows(2));
         let wrong = pairs.filter(|(found, of)| found[1] - found[0] != of[1].2 - of[0].2).count();
         wrong as f64 / stamps.len() as f64

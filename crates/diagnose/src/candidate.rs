@@ -116,15 +116,15 @@ pub(crate) fn terms(candidates: &[Candidate]) -> Vec<Box<dyn ModelTerm>> {
 }
 
 /// The terms of candidates, in order; products that follow each other come as one.
-pub(crate) fn terms_together<'c>(candidates: impl Iterator<Item = &'c Candidate>) -> Vec<Box<dyn ModelTerm>> {
-    let product = |candidate: &&Candidate| matches!(candidate, Candidate::Sparse(sparse) if sparse.shares_moments());
+pub(crate) fn batched_terms<'c>(candidates: impl Iterator<Item = &'c Candidate>) -> Vec<Box<dyn ModelTerm>> {
+    let product = |candidate: &&Candidate| matches!(candidate, Candidate::Sparse(sparse) if sparse.shares_samples());
     let candidates: Vec<&Candidate> = candidates.collect();
     let of_chunk = |chunk: &[&Candidate]| {
         let sparse = chunk.iter().filter_map(|candidate| match candidate {
             Candidate::Sparse(sparse) => Some(sparse.clone()),
             Candidate::Effect { .. } => None,
         });
-        if product(&chunk[0]) { Sparse::together(&sparse.collect::<Vec<_>>()) } else { chunk[0].term() }
+        if product(&chunk[0]) { Sparse::batched(&sparse.collect::<Vec<_>>()) } else { chunk[0].term() }
     };
     candidates.chunk_by(|a, b| product(a) && product(b)).filter_map(of_chunk).collect()
 }

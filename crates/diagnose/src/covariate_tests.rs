@@ -62,8 +62,8 @@ fn questions(fit: &ModelFit<'_>) -> Vec<Question> {
             [Channel::LeftWheel, Channel::RightWheel].map(|channel| on(channel, &of_wheel)).to_vec(),
         ],
     };
-    let bends = [AbsSpeed, AbsYawRate].map(|rate| on(Channel::Yaw, &[rate, Curvature])).to_vec();
-    let of_bends = Question { name: "bend".to_owned(), groups: vec![bends] };
+    let curvatures = [AbsSpeed, AbsYawRate].map(|rate| on(Channel::Yaw, &[rate, Curvature])).to_vec();
+    let of_curvature = Question { name: "bend".to_owned(), groups: vec![curvatures] };
     // A row that is longer than usual by its stamps, and not in truth.
     let of_rows = Question { name: "row_length".to_owned(), groups: vec![vec![Candidate::Sparse(Sparse::of_rows())]] };
     // A cosine and a sine for each number of cycles in a turn.
@@ -72,7 +72,7 @@ fn questions(fit: &ModelFit<'_>) -> Vec<Question> {
         groups: of_cycles(side).chunks(2).map(|both| both.iter().cloned().map(Candidate::Sparse).collect()).collect(),
     };
     let of_wheels = [(Side::Left, "left_wheel_cycles"), (Side::Right, "right_wheel_cycles")].map(of_cycles);
-    of_motion.chain([of_reversals, of_bends, of_rows]).chain(of_wheels).collect()
+    of_motion.chain([of_reversals, of_curvature, of_rows]).chain(of_wheels).collect()
 }
 
 /// Score tests of every question.
@@ -128,8 +128,8 @@ fn deflated(
     let matter: Vec<usize> = (0..answers.len())
         .filter(|part| answers[*part].is_some_and(|answer| answer.p_value < RESIMULATED_LEVEL))
         .collect();
-    let asked: Vec<&[Candidate]> = matter.iter().map(|part| parts[*part]).collect();
-    for (part, inflation) in matter.into_iter().zip(null.inflation(&asked)) {
+    let groups_that_matter: Vec<&[Candidate]> = matter.iter().map(|part| parts[*part]).collect();
+    for (part, inflation) in matter.into_iter().zip(null.inflation(&groups_that_matter)) {
         if let Some(answer) = &mut answers[part] {
             answer.statistic /= inflation;
             answer.p_value = p_of_score(answer.statistic, answer.dimensions, answer.count, answer.freedom);

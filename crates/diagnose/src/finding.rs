@@ -77,7 +77,7 @@ impl Finding {
     }
 
     /// Whether it is a mean effect that no uncatalogued cause is held to explain as well.
-    pub(crate) fn is_sure(&self) -> bool {
+    pub(crate) fn is_certain(&self) -> bool {
         self.is_mean() && !self.has_unlisted()
     }
 
@@ -210,7 +210,7 @@ pub(crate) fn or_incomplete(findings: &mut [Finding], (score, p_value): (f64, f6
     let bayes_factor_bound = (-std::f64::consts::E * p_value * p_value.max(f64::MIN_POSITIVE).ln()).recip();
     let odds = (bayes_factor_bound * UNCATALOGUED_PRIOR / (1.0 - UNCATALOGUED_PRIOR)).min(1.0);
     let is_incomplete =
-        |finding: &&mut Finding| finding.is_sure() && score > MODEL_MISMATCH_FRACTION * finding.z.powi(2);
+        |finding: &&mut Finding| finding.is_certain() && score > MODEL_MISMATCH_FRACTION * finding.z.powi(2);
     for finding in findings.iter_mut().filter(is_incomplete) {
         finding.or_unlisted(odds, Doubt::Incomplete);
     }
@@ -218,7 +218,7 @@ pub(crate) fn or_incomplete(findings: &mut [Finding], (score, p_value): (f64, f6
 
 /// Doubts effects of low significance that no other doubt is on.
 pub(crate) fn or_of_low_significance(findings: &mut [Finding]) {
-    for finding in findings.iter_mut().filter(|finding| finding.is_sure() && finding.z < LOW_SIGNIFICANCE_SIGMAS) {
+    for finding in findings.iter_mut().filter(|finding| finding.is_certain() && finding.z < LOW_SIGNIFICANCE_SIGMAS) {
         finding.or_unlisted(NONE_OF_CAUSES_ODDS, Doubt::LowSignificance);
     }
 }

@@ -153,7 +153,7 @@ fn faults_of_the_log(results: &StageResults<'_, '_>, mut findings: Vec<Finding>)
     deviations.retain(|deviation| wheels.is_none() || deviation.of != GeometryRatio::Wheels);
     // An effect that is found beside another robot's geometry may be what the geometry is wrong by.
     if wheels.is_some() || deviations.iter().any(|deviation| !deviation.is_of_skid_steering()) {
-        for finding in findings.iter_mut().filter(|finding| finding.is_sure()) {
+        for finding in findings.iter_mut().filter(|finding| finding.is_certain()) {
             finding.or_unlisted(1.0, Doubt::OtherGeometry);
         }
     }
@@ -203,7 +203,7 @@ fn doubt_parts_of_stronger_findings(results: &StageResults<'_, '_>, mut findings
 
 /// An uncatalogued term that is significant beside all that was found, though not by enough to be a finding.
 fn doubt_incomplete_models(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
-    if findings.iter().any(Finding::is_sure)
+    if findings.iter().any(Finding::is_certain)
         && let Some(left) = lack_of_fit(&results.structure.base, results.structure.model())
     {
         finding::or_incomplete(&mut findings, left);

@@ -66,9 +66,12 @@ mod tests {
         assert!((alike.p_value - (-1.0_f64).exp()).abs() < 1e-9, "{alike:?}");
         assert!((alike.less_than_half - 0.0366).abs() < 1e-4, "{alike:?}");
         // Q = 100 · 2 · 0.64 = 128; τ² = (128 − 2)/(300 − 100) = 0.63.
-        let apart = Heterogeneity::of(&[(0.2, 0.1), (1.0, 0.1), (1.8, 0.1)]).expect("three");
-        assert!((apart.q - 128.0).abs() < 1e-9 && (apart.tau - 0.63_f64.sqrt()).abs() < 1e-9, "{apart:?}");
-        assert!(apart.p_value < 1e-20 && apart.less_than_half > 0.3, "{apart:?}");
+        let heterogeneous = Heterogeneity::of(&[(0.2, 0.1), (1.0, 0.1), (1.8, 0.1)]).expect("three");
+        assert!(
+            (heterogeneous.q - 128.0).abs() < 1e-9 && (heterogeneous.tau - 0.63_f64.sqrt()).abs() < 1e-9,
+            "{heterogeneous:?}"
+        );
+        assert!(heterogeneous.p_value < 1e-20 && heterogeneous.less_than_half > 0.3, "{heterogeneous:?}");
         assert!(Heterogeneity::of(&[(1.0, 0.1), (0.2, 0.1)]).is_none());
     }
 }

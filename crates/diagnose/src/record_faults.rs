@@ -61,7 +61,7 @@ pub(crate) fn fault(
         if sound && effects::description(id).is_some_and(|description| !description.record_fault.leaves_a_trace) {
             continue;
         }
-        for Form { values, sentence, visible_in_log, records } in together(datasets, corrections) {
+        for Form { values, sentence, visible_in_log, records } in batched(datasets, corrections) {
             if outlying && !visible_in_log {
                 continue;
             }
@@ -213,7 +213,7 @@ fn is_same(a: &[(&'static str, f64)], b: &[(&'static str, f64)]) -> bool {
 }
 
 /// The same rewriting of all sessions; a session in which it is impossible stays as it is.
-fn together(datasets: &[Dataset], corrections: fn(&Dataset) -> Vec<RecordCorrection>) -> Vec<Form> {
+fn batched(datasets: &[Dataset], corrections: fn(&Dataset) -> Vec<RecordCorrection>) -> Vec<Form> {
     let each: Vec<Vec<RecordCorrection>> = datasets.iter().map(corrections).collect();
     let mut forms: Vec<Form> = Vec::new();
     for correction in each.iter().flatten() {

@@ -371,9 +371,9 @@ mod tests {
         // 234 pairs show a correlation to 0.07.
         assert!(is_white(&white).0 && !is_white(&alike).0, "{:?} {:?}", is_white(&white), is_white(&alike));
         assert!((is_white(&alike).1 - 0.7).abs() < 0.2, "{:?}", is_white(&alike));
-        let said = |dataset: Dataset| diagnose(&[dataset], &Options::default()).expect("a diagnosis").document;
-        assert_eq!(said(white).verdict, Verdict::Consistent);
-        let document = said(alike);
+        let diagnosed = |dataset: Dataset| diagnose(&[dataset], &Options::default()).expect("a diagnosis").document;
+        assert_eq!(diagnosed(white).verdict, Verdict::Consistent);
+        let document = diagnosed(alike);
         let names: Vec<&str> = document.findings.iter().map(|finding| finding.id.as_str()).collect();
         assert_eq!(names, ["truth_correlated_noise"]);
     }

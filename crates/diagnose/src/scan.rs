@@ -11,7 +11,7 @@ use model_term::TermParameter;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::candidate::{Candidate, terms, terms_together};
+use crate::candidate::{Candidate, batched_terms, terms};
 use crate::settings::search::{
     DECIMATION_STEP_S, MAX_COLUMNS_PER_PASS, MIN_COLUMN_SHARE, MIN_DETECTABLE_SIGMAS, PRIOR_SCALES,
 };
@@ -110,7 +110,7 @@ pub(crate) fn scan_parts_of<T: Send>(
     let of_pass = |(fit, parts): &(&ModelFit<'_>, Vec<NumberedPart<'_>>)| {
         let mut all = terms(chosen);
         let mut at = Column::BASE.len() + all.iter().map(|term| term.parameters().len()).sum::<usize>();
-        all.extend(terms_together(parts.iter().flat_map(|(_, part)| *part)));
+        all.extend(batched_terms(parts.iter().flat_map(|(_, part)| *part)));
         let columns_of: Vec<usize> = parts.iter().map(|(_, part)| columns_of(part)).collect();
         let Some(equations) = total(&fit.scan_parts(&mut all, &columns_of)) else { return Vec::new() };
         let Some(projection) = fit.eliminated(&equations, &[]) else { return Vec::new() };

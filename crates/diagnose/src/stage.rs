@@ -72,13 +72,16 @@ mod tests {
 
     #[test]
     fn stages_begin_in_their_order_and_their_shares_grow_from_zero() {
-        let told = Arc::new(Mutex::new(Vec::new()));
-        let tell = Arc::clone(&told);
-        let on_stage = OnStage::call(move |stage| tell.lock().expect("one thread").push(stage));
+        let reported = Arc::new(Mutex::new(Vec::new()));
+        let report = Arc::clone(&reported);
+        let on_stage = OnStage::call(move |stage| report.lock().expect("one thread").push(stage));
         STEPS.iter().for_each(|(step, ..)| on_stage.begins(*step));
-        let told = told.lock().expect("one thread");
-        assert_eq!((told.len(), told[0].done), (STEPS.len(), 0.0));
-        assert!(told.windows(2).all(|pair| pair[0].done < pair[1].done) && told[told.len() - 1].done < 1.0, "{told:?}");
+        let reported = reported.lock().expect("one thread");
+        assert_eq!((reported.len(), reported[0].done), (STEPS.len(), 0.0));
+        assert!(
+            reported.windows(2).all(|pair| pair[0].done < pair[1].done) && reported[reported.len() - 1].done < 1.0,
+            "{reported:?}"
+        );
         OnStage::default().begins(Step::Gain);
     }
 }

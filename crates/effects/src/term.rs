@@ -26,14 +26,14 @@ use crate::forward::{Forward, Hooks, PoseReading, RunStart, Step};
 use crate::hypothesis::{Hypothesis, Variant};
 use crate::motion_history::{MotionHistory, MotionHistoryTracker};
 use crate::on_board::OnBoard;
+use product_batch::ProductBatch;
 use recorded::{OfRows, ROW_SHARE, Recorded};
 pub use sparse::Sparse;
 use sparse::{CONSTANT, on_channel, parameter, seen};
-use together::ProductBatch;
 
+mod product_batch;
 mod recorded;
 mod sparse;
-mod together;
 
 /// `kind` of a [`SparseTerm`] in a scenario.
 pub(crate) const TERM: &str = "term";
@@ -53,10 +53,10 @@ impl Sparse {
     }
 
     /// Many of them as one term, which has their coefficients in turn. `None` where one of them is none of
-    /// [`Self::shares_moments`].
+    /// [`Self::shares_samples`].
     #[must_use]
-    pub fn together(all: &[Self]) -> Option<Box<dyn ModelTerm>> {
-        all.iter().all(Self::shares_moments).then(|| Box::new(ProductBatch::new(all)) as Box<dyn ModelTerm>)
+    pub fn batched(all: &[Self]) -> Option<Box<dyn ModelTerm>> {
+        all.iter().all(Self::shares_samples).then(|| Box::new(ProductBatch::new(all)) as Box<dyn ModelTerm>)
     }
 }
 

@@ -72,7 +72,7 @@ fn join_intervals<'a>(segment: &Segment<'a>, longest_s: f64) -> (Segment<'a>, Ve
                 last.dt_s = all_s;
                 // Arcs that follow each other go across the arc of their sum.
                 let (a, b) = (last.wheel_rad, interval.wheel_rad);
-                last.bend_rad2 += interval.bend_rad2 + 0.5 * (a.right * b.left - a.left * b.right);
+                last.chord_area_rad2 += interval.chord_area_rad2 + 0.5 * (a.right * b.left - a.left * b.right);
                 last.wheel_rad = last.wheel_rad.zip_with(interval.wheel_rad, |last, rad| last + rad);
                 last.late_s[1] = interval.late_s[1];
             }

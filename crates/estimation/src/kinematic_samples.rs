@@ -165,7 +165,7 @@ mod tests {
                 rate_rad_s: *wheel_rad,
                 rate_at_ends_rad_s: [[0.0, 0.05], [0.05, -0.1], [-0.1, -0.2]][usize::from(row)].map(Wheels::both),
                 late_s: [0.0; 2],
-                bend_rad2: 0.0,
+                chord_area_rad2: 0.0,
                 stands: false,
                 starts_within_row: false,
                 interpolated_rad2: [Wheels::both(0.0); 2],

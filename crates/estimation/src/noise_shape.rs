@@ -49,9 +49,9 @@ impl NoiseShape {
     /// smaller eigenvalue of the position's part, and the heading's variance given the position.
     pub(crate) fn least_factors(&self) -> [f64; 2] {
         let f = self.covariance([1.0; 2]);
-        let [mean, apart] = [0.5 * (f[(0, 0)] + f[(1, 1)]), 0.5 * (f[(0, 0)] - f[(1, 1)])];
+        let [mean, half_difference] = [0.5 * (f[(0, 0)] + f[(1, 1)]), 0.5 * (f[(0, 0)] - f[(1, 1)])];
         let heading = f.try_inverse().map_or(f[(2, 2)], |inverse| 1.0 / inverse[(2, 2)]);
-        [mean - apart.hypot(f[(0, 1)]), heading]
+        [mean - half_difference.hypot(f[(0, 1)]), heading]
     }
 
     /// R in the room for variances of position and heading.

@@ -68,12 +68,12 @@ impl ModelFit<'_> {
             let [from, to] = interval.interpolated_rad2.map(|variance| variance.map(f64::sqrt));
             let travel_m = model.m_per_rad.zip_with(*smooth, |m_per_rad, rad| m_per_rad * rad);
             let Increment { turn_rad, .. } = Increment::from_travel(travel_m, model.separation_m);
-            let apart_m = 0.5 * model.separation_m * (turn * turn_rad.abs()).sqrt() * draws.normal();
+            let scrub_m = 0.5 * model.separation_m * (turn * turn_rad.abs()).sqrt() * draws.normal();
             interval.wheel_rad = Wheels::from_sides(|side| {
                 let noise_m = (wheel * travel_m[side].abs()).sqrt() * draws.normal();
                 let sense = if side == Side::Left { -1.0 } else { 1.0 };
                 let bent_rad = within_row[side] * (to[side] - from[side]);
-                smooth[side] + bent_rad + (noise_m + sense * apart_m) / model.m_per_rad[side]
+                smooth[side] + bent_rad + (noise_m + sense * scrub_m) / model.m_per_rad[side]
             });
         }
         rolled

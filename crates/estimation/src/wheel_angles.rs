@@ -27,7 +27,7 @@ pub(crate) struct WheelInterval {
     /// What makes the centre go across the arc of its wheels' turns: (w_R Δr_L − w_L Δr_R) T/12 for turns w
     /// and rates that change by Δr, rad². It is (ω Δv − v Δω) T²/12 of the robot, the second term of Magnus
     /// 1954.
-    pub(crate) bend_rad2: f64,
+    pub(crate) chord_area_rad2: f64,
     /// No count comes in it, nor near it.
     pub(crate) stands: bool,
     /// It starts within a row, and not at one.
@@ -96,11 +96,11 @@ impl<'a> WheelAngleInterpolator<'a> {
         let continuous = run.info().continuous;
         let drive = robot.geometry().map_or((1.0, Wheels::both(1.0)), |of| (of.wheel_separation_m(), of.m_per_rad()));
         // Of stamps that are exact but for a few, those few are true.
-        let beat = if continuous && are_inexact(&odometry.t_s) { SamplingPeriod::of(&odometry.t_s) } else { None };
-        let beat_late_s = beat.map_or_else(|| vec![0.0; odometry.t_s.len()], |beat| beat.late_s);
-        let rates = WheelRates::of((&odometry.t_s, &beat_late_s), &turn_rad, quantum_rad, drive, continuous);
+        let period = if continuous && are_inexact(&odometry.t_s) { SamplingPeriod::of(&odometry.t_s) } else { None };
+        let late_s = period.map_or_else(|| vec![0.0; odometry.t_s.len()], |period| period.late_s);
+        let rates = WheelRates::of((&odometry.t_s, &late_s), &turn_rad, quantum_rad, drive, continuous);
         let late_s = if continuous {
-            beat_late_s.windows(2).map(|pair| [pair[0], pair[1]]).collect()
+            late_s.windows(2).map(|pair| [pair[0], pair[1]]).collect()
         } else {
             // Which end of a row between gaps is off nobody knows; the length counts.
             row_jitter_s(&odometry.t_s).into_iter().map(|jitter_s| [-0.5 * jitter_s, 0.5 * jitter_s]).collect()
@@ -338,7 +338,7 @@ impl Cursor<'_, '_> {
                 ends[0].zip_with(ends[1], |start, end| 0.5 * (start + end))
             };
             let change = self.track.acceleration_rad_s2(row).map(|acceleration| acceleration * dt_s);
-            let bend_rad2 = (wheel_rad.right * change.left - wheel_rad.left * change.right) * dt_s / 12.0;
+            let chord_area_rad2 = (wheel_rad.right * change.left - wheel_rad.left * change.right) * dt_s / 12.0;
             let stands = self.track.rates.stands(rows_s, [at_s, t_s], row);
             let starts_within_row = at_s > rows_s[row] + TIME_TOLERANCE_S;
             let interpolated_rad2 = [at_s, t_s].map(|t_s| self.track.interpolated_rad2(row, t_s));
@@ -349,7 +349,7 @@ impl Cursor<'_, '_> {
                 late_s: [at_s, t_s].map(|t_s| self.track.late_at(row, t_s)),
                 rate_rad_s,
                 rate_at_ends_rad_s: ends,
-                bend_rad2,
+                chord_area_rad2,
                 stands,
                 starts_within_row,
                 interpolated_rad2,

@@ -387,10 +387,10 @@ mod tests {
         let t_s: Vec<f64> = (0..400).map(|row| 0.01 * f64::from(row) + jitter(row)).collect();
         let angle = |t_s: f64| 3.0 * t_s - 1.5 * (1.1 * t_s).cos();
         let by_stamps = Wheels::both(t_s.iter().map(|t_s| angle(*t_s)).collect::<Vec<f64>>());
-        let by_beat = Wheels::both((0..400).map(|row| angle(0.01 * f64::from(row))).collect::<Vec<f64>>());
+        let by_period = Wheels::both((0..400).map(|row| angle(0.01 * f64::from(row))).collect::<Vec<f64>>());
         // The rate by stamps is off by the jitter of both ends, 0.12 of it: 1 and 0 to the square of that.
-        let [of_stamps, of_beat] = [&by_stamps, &by_beat].map(|turns| share_of_true_stamps(&t_s, turns));
-        assert!(of_stamps > 0.97 && of_beat < 0.03, "{of_stamps} {of_beat}");
+        let [of_stamps, of_period] = [&by_stamps, &by_period].map(|turns| share_of_true_stamps(&t_s, turns));
+        assert!(of_stamps > 0.97 && of_period < 0.03, "{of_stamps} {of_period}");
     }
 
     #[test]

@@ -58,21 +58,21 @@ impl FollowedInputs {
     /// What is known where an interval begins, once what was told at its end is taken.
     pub(crate) fn after(
         &mut self,
-        told: &OnBoardInputs,
+        logged: &OnBoardInputs,
         before: Pose,
         turned_rad: Wheels<f64>,
         (distance_m, turn_rad, dt_s): (f64, f64, f64),
     ) -> KnownInputs {
-        let from = |told: Option<f64>, known: Option<f64>, by: f64| told.map(|told| told - by).or(known);
-        let wheel_rad = Wheels::from_sides(|side| from(told.wheel_rad[side], self.wheel_rad[side], turned_rad[side]));
+        let from = |logged: Option<f64>, known: Option<f64>, by: f64| logged.map(|logged| logged - by).or(known);
+        let wheel_rad = Wheels::from_sides(|side| from(logged.wheel_rad[side], self.wheel_rad[side], turned_rad[side]));
         self.wheel_rad = Wheels::from_sides(|side| wheel_rad[side].map(|from_rad| from_rad + turned_rad[side]));
-        if let Some(heading_rad) = told.room_heading_rad {
+        if let Some(heading_rad) = logged.room_heading_rad {
             self.room_offset_rad = Some(heading_rad - (before.theta_rad + turn_rad));
         }
-        self.payload_kg = told.payload_kg.or(self.payload_kg);
-        let session_s = from(told.session_s, self.session_s, dt_s);
+        self.payload_kg = logged.payload_kg.or(self.payload_kg);
+        let session_s = from(logged.session_s, self.session_s, dt_s);
         self.session_s = session_s.map(|session_s| session_s + dt_s);
-        let session_m = from(told.session_m, self.session_m, distance_m.abs());
+        let session_m = from(logged.session_m, self.session_m, distance_m.abs());
         self.session_m = session_m.map(|session_m| session_m + distance_m.abs());
         KnownInputs {
             wheel_rad,
@@ -173,14 +173,14 @@ mod tests {
         let known = followed.after(&nothing, at(0.0), turned, step);
         assert!(Input::ALL.iter().filter(|input| known.has(**input)).eq([&Input::WheelAngles]));
         assert_eq!(known.wheel_rad, Wheels::both(None));
-        let told = OnBoardInputs {
+        let logged = OnBoardInputs {
             wheel_rad: Wheels { left: Some(5.0), right: None },
             room_heading_rad: Some(1.2),
             payload_kg: Some(3.0),
             session_s: Some(60.02),
             session_m: Some(7.1),
         };
-        let known = followed.after(&told, at(0.2), turned, step);
+        let known = followed.after(&logged, at(0.2), turned, step);
         assert_eq!(known.wheel_rad, Wheels { left: Some(4.0), right: None });
         let near = |found: Option<f64>, expected: f64| found.is_some_and(|found| (found - expected).abs() < 1e-12);
         assert!(near(known.room_heading_rad, 1.0) && near(known.session_s, 60.0) && near(known.session_m, 7.0));

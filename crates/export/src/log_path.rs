@@ -17,7 +17,7 @@ pub struct LogStart {
     /// Distance driven in the session before, metres.
     pub session_m: f64,
     /// The robot is told at its start what the log says beside counts; else nothing.
-    pub is_told: bool,
+    pub is_logged: bool,
 }
 
 impl CalibratedRobot {
@@ -38,8 +38,8 @@ impl CalibratedRobot {
             return Ok(None);
         }
         let mut odometry = OnBoardOdometry::new(self, counter_bits, counts(0))?.starting_at(start.world_from_body);
-        if start.is_told {
-            odometry.step_with(counts(0), 0.0, &self.told(&run.info, t_s[0], counts(0), start)?);
+        if start.is_logged {
+            odometry.step_with(counts(0), 0.0, &self.logged(&run.info, t_s[0], counts(0), start)?);
         }
         let mut path = vec![(t_s[0], odometry.pose())];
         for row in 1..t_s.len() {
@@ -56,7 +56,7 @@ impl CalibratedRobot {
     }
 
     /// What a log says at its first row beside counts.
-    fn told(
+    fn logged(
         &self,
         info: &RunInfo,
         t_s: f64,

@@ -94,7 +94,7 @@ impl OnBoardOdometry {
     }
 
     /// Goes on to these counts, which came so many seconds after those before, with what is told of them.
-    pub fn step_with(&mut self, counts: Wheels<i64>, dt_s: f64, told: &OnBoardInputs) {
+    pub fn step_with(&mut self, counts: Wheels<i64>, dt_s: f64, logged: &OnBoardInputs) {
         let bits = self.counter_bits;
         let since = counts.zip_with(self.counts, |now, before| difference(now, before, bits));
         self.counts = counts;
@@ -108,7 +108,7 @@ impl OnBoardOdometry {
         let before = self.pose;
         let Increment { distance_m, turn_rad } = Increment::from_travel(travel_m, self.wheel_separation_m);
         let turned_rad = since.map(|counts| self.rad_per_count * counts);
-        let known = self.inputs.after(told, before, turned_rad, (distance_m, turn_rad, dt_s));
+        let known = self.inputs.after(logged, before, turned_rad, (distance_m, turn_rad, dt_s));
         if let (Some(payload_kg), Some(key)) = (known.payload_kg, Input::Payload.covariate()) {
             self.run.covariates.insert(key.to_owned(), payload_kg);
         }

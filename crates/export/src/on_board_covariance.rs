@@ -56,10 +56,11 @@ impl OnBoardCovariance {
         let Increment { distance_m, turn_rad } = interval.increment();
         let half_rad = 0.5 * turn_rad;
         let (sin, cos) = sin_cos(before.theta_rad + half_rad);
-        let (chord, bend) = (sinc(half_rad), sinc_derivative(half_rad));
+        let (chord, chord_slope) = (sinc(half_rad), sinc_derivative(half_rad));
         let per_m = turn_rad / self.separation_m;
         let along = distance_m * chord * self.by_separation.z;
-        let by_turn = 0.5 * distance_m * Vector3::new(bend * cos - chord * sin, bend * sin + chord * cos, 0.0);
+        let by_turn =
+            0.5 * distance_m * Vector3::new(chord_slope * cos - chord * sin, chord_slope * sin + chord * cos, 0.0);
         self.by_separation += along * Vector3::new(-sin, cos, 0.0) - per_m * (by_turn + Vector3::z());
         // As noise of wheels, whose variance goes with the travel.
         let sigma = Wheels::from_sides(|side| {

@@ -82,7 +82,7 @@ fn has_compiler(test: &str) -> bool {
 struct Record {
     counts: Wheels<i64>,
     dt_s: f64,
-    told: OnBoardInputs,
+    logged: OnBoardInputs,
 }
 
 /// A robot that drives ahead and back, in bends and on the spot, creeps and stands at times; its counters
@@ -106,14 +106,14 @@ fn log() -> &'static [Record] {
             };
             let at = |every: usize, value: f64| (step % every == every / 20).then_some(value);
             let rad = angle.map(|counts: f64| counts.round() * std::f64::consts::TAU / 8192.0);
-            let told = OnBoardInputs {
+            let logged = OnBoardInputs {
                 wheel_rad: Wheels { left: at(3000, rad.left + 1.0), right: at(5000, rad.right - 2.0) },
                 room_heading_rad: at(2000, 0.3 * t_s.sin()),
                 payload_kg: at(20_000, 3.0 + (step / 20_000) as f64),
                 session_s: at(50_000, t_s + 100.0),
                 session_m: at(50_000, 0.2 * t_s + 1e4),
             };
-            Record { counts: angle.map(|counts: f64| (counts.round() as i64 - 17) & 0xffff), dt_s, told }
+            Record { counts: angle.map(|counts: f64| (counts.round() as i64 - 17) & 0xffff), dt_s, logged }
         };
         (0..=STEPS).map(record).collect()
     })
@@ -126,8 +126,8 @@ fn folder() -> &'static Path {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("compiled_header_{}", std::process::id()));
         std::fs::create_dir_all(&folder).expect("made");
         let mut bytes = Vec::with_capacity(log().len() * 80);
-        for Record { counts, dt_s, told } in log() {
-            let OnBoardInputs { wheel_rad, room_heading_rad, payload_kg, session_s, session_m } = *told;
+        for Record { counts, dt_s, logged } in log() {
+            let OnBoardInputs { wheel_rad, room_heading_rad, payload_kg, session_s, session_m } = *logged;
             let values = [wheel_rad.left, wheel_rad.right, room_heading_rad, payload_kg, session_s, session_m];
             let known = values.iter().enumerate().map(|(bit, value)| i64::from(value.is_some()) << bit).sum::<i64>();
             [counts.left, counts.right, known].iter().for_each(|of| bytes.extend(of.to_ne_bytes()));
@@ -141,13 +141,13 @@ fn folder() -> &'static Path {
 }
 
 /// What the compiled header prints for the log.
-fn compiled(header: &str, name: &str, is_told: bool) -> Vec<Vec<f64>> {
+fn compiled(header: &str, name: &str, is_logged: bool) -> Vec<Vec<f64>> {
     let own = folder().join(name);
     std::fs::create_dir_all(&own).expect("made");
     std::fs::write(own.join("odometry.h"), header).expect("written");
     let mut gcc = Command::new("gcc");
     gcc.args(["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-O1", "-I."]);
-    if is_told {
+    if is_logged {
         gcc.arg("-DTOLD");
     }
     let compiler = gcc.args(["../main.c", "-lm", "-o", "main"]).current_dir(&own).output().expect("gcc runs");
@@ -160,12 +160,12 @@ fn compiled(header: &str, name: &str, is_told: bool) -> Vec<Vec<f64>> {
 }
 
 /// What the same arithmetic gives in Rust.
-fn in_rust(robot: &CalibratedRobot, is_told: bool) -> Vec<Vec<f64>> {
+fn in_rust(robot: &CalibratedRobot, is_logged: bool) -> Vec<Vec<f64>> {
     let mut odometry = OnBoardOdometry::new(robot, Some(16), log()[0].counts).expect("a drive");
     let mut rows = Vec::new();
-    for (step, Record { counts, dt_s, told }) in log().iter().enumerate().skip(1) {
+    for (step, Record { counts, dt_s, logged }) in log().iter().enumerate().skip(1) {
         let nothing = OnBoardInputs::default();
-        odometry.step_with(*counts, *dt_s, if is_told { told } else { &nothing });
+        odometry.step_with(*counts, *dt_s, if is_logged { logged } else { &nothing });
         if step % COMPARED == 0 {
             let pose = odometry.pose();
             let mut row = vec![pose.x_m, pose.y_m, pose.theta_rad];
@@ -358,9 +358,9 @@ fn all_effects_together_compiled_are_the_same_over_an_hour() {
         return;
     }
     let robot = with_effects(&on_board(|of| of.code().is_some()), 1.0);
-    for (is_told, name) in [(true, "all"), (false, "all_untold")] {
-        let found = compiled(&header(&robot), name, is_told);
-        let (off, off_covariance) = differences(&found, &in_rust(&robot, is_told));
+    for (is_logged, name) in [(true, "all"), (false, "all_untold")] {
+        let found = compiled(&header(&robot), name, is_logged);
+        let (off, off_covariance) = differences(&found, &in_rust(&robot, is_logged));
         assert!(off < TOLERANCE && off_covariance < TOLERANCE, "{name}: {off} {off_covariance}");
     }
 }

@@ -19,7 +19,7 @@ use nalgebra::{Cholesky, Matrix2x3, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use crate::geometry::{GEOMETRY, GeometryEstimate, lengths_m};
+use crate::geometry::{GEOMETRY, GeometryEstimate, geometry_m};
 use crate::settings::DIFFERENCE_STEP;
 
 /// Predicted drift with the configured geometry minus that with the calibrated one, per cent of the distance.
@@ -48,12 +48,12 @@ impl ExcessDrift {
         let not_a_drive = |error: GeometryError| error.to_string();
         let configured = session.robot.geometry().map_err(not_a_drive)?;
         let calibrated = calibration.geometry;
-        let (mut apart_m, mut error_m, mut length_m) = (0.0, 0.0, 0.0);
+        let (mut separation_m, mut error_m, mut length_m) = (0.0, 0.0, 0.0);
         for run in &session.runs {
             let Some((end, driven_m)) = end_and_length(run, session.robot, &calibrated) else { continue };
             let Some((other, _)) = end_and_length(run, session.robot, &configured) else { continue };
             let jacobian = end_by_geometry(run, session.robot, &calibrated).map_err(not_a_drive)?;
-            apart_m += end.distance_m(other);
+            separation_m += end.distance_m(other);
             error_m += (jacobian * covariance * jacobian.transpose()).trace().max(0.0).sqrt();
             length_m += driven_m;
         }
@@ -61,7 +61,7 @@ impl ExcessDrift {
             return Err("no run goes anywhere: there is no distance to drift on".to_owned());
         }
         Ok(Self {
-            percent: 100.0 * apart_m / length_m,
+            percent: 100.0 * separation_m / length_m,
             sigma_percent: 100.0 * error_m / length_m,
             p_value: p_value(&configured, &calibrated, covariance, calibration.runs_used).ok_or_else(no_scatter)?,
         })
@@ -76,7 +76,7 @@ fn p_value(
     runs: usize,
 ) -> Option<f64> {
     let tested = GEOMETRY.len();
-    let difference_m = Vector3::from(lengths_m(calibrated)) - Vector3::from(lengths_m(configured));
+    let difference_m = Vector3::from(geometry_m(calibrated)) - Vector3::from(geometry_m(configured));
     let t_squared = difference_m.dot(&Cholesky::new(covariance_m2)?.solve(&difference_m));
     // Degrees of freedom of the scatter, and of the ratio's denominator.
     let of_scatter = runs.checked_sub(1)? as f64;
@@ -104,7 +104,7 @@ fn end_by_geometry(
     let mut jacobian = Matrix2x3::zeros();
     for column in 0..GEOMETRY.len() {
         let at = |sign: f64| {
-            let mut moved_m = lengths_m(geometry);
+            let mut moved_m = geometry_m(geometry);
             let step_m = DIFFERENCE_STEP * moved_m[column];
             moved_m[column] += sign * step_m;
             let [left, right, separation_m] = moved_m;

@@ -9,7 +9,7 @@ pub const GEOMETRY: [Parameter; 3] =
     [Parameter::LeftWheelDiameter, Parameter::RightWheelDiameter, Parameter::WheelSeparation];
 
 /// Left diameter, right diameter and separation, metres.
-pub(crate) fn lengths_m(geometry: &DriveGeometry) -> [f64; 3] {
+pub(crate) fn geometry_m(geometry: &DriveGeometry) -> [f64; 3] {
     let diameter_m = geometry.wheel_diameter_m();
     [diameter_m.left, diameter_m.right, geometry.wheel_separation_m()]
 }
@@ -39,8 +39,8 @@ impl GeometryEstimate {
     /// The geometry of a calibration; `determined` says which of the parameters the runs determine.
     #[must_use]
     pub fn of(calibration: &Calibration, determined: impl Fn(Parameter) -> bool) -> Self {
-        let lengths_m = lengths_m(&calibration.geometry);
-        let value = |row: usize| Some(lengths_m[row]).filter(|_| determined(GEOMETRY[row]));
+        let geometry_m = geometry_m(&calibration.geometry);
+        let value = |row: usize| Some(geometry_m[row]).filter(|_| determined(GEOMETRY[row]));
         let rows = |of: &Covariance| [0, 1, 2].map(|row| [0, 1, 2].map(|column| of[(row, column)]));
         let undetermined = calibration.not_observable.iter();
         Self {

@@ -192,9 +192,9 @@ fn warnings(sessions: &[FleetSession]) -> Vec<String> {
         }
         if before.result.nominal != after.result.nominal {
             let of = |robot: &NominalRobot| {
-                let lengths_m = [robot.left_wheel_diameter_m, robot.right_wheel_diameter_m, robot.wheel_separation_m];
+                let geometry_m = [robot.left_wheel_diameter_m, robot.right_wheel_diameter_m, robot.wheel_separation_m];
                 let ticks = robot.ticks_per_rev.map_or_else(String::new, |ticks| format!(", {ticks} ticks"));
-                lengths_m.map(|length_m| format!("{:.3}", 1e3 * length_m)).join(", ") + " mm" + &ticks
+                geometry_m.map(|length_m| format!("{:.3}", 1e3 * length_m)).join(", ") + " mm" + &ticks
             };
             warnings.push(format!(
                 "[robot] differs between {earlier} ({}) and {later} ({}): changes are of the calibrated values, the excess is over the later",

@@ -269,7 +269,7 @@ mod tests {
     use std::f64::consts::{FRAC_PI_2, PI};
 
     /// How many doubles apart.
-    fn units_apart(a: f64, b: f64) -> u64 {
+    fn ulps_between(a: f64, b: f64) -> u64 {
         let ordered = |x: f64| if x < 0.0 { -x.abs().to_bits().cast_signed() } else { x.to_bits().cast_signed() };
         ordered(a).abs_diff(ordered(b))
     }
@@ -288,7 +288,7 @@ mod tests {
         for largest in [1.0 / 32.0, FRAC_PI_4, 1.0, 10.0, 1e3, 1e5, LARGEST_RAD] {
             for x in arguments(largest) {
                 let ((sin, cos), (their_sin, their_cos)) = (sin_cos(x), x.sin_cos());
-                assert!(units_apart(sin, their_sin) <= 2 && units_apart(cos, their_cos) <= 2, "{x}: {sin} {cos}");
+                assert!(ulps_between(sin, their_sin) <= 2 && ulps_between(cos, their_cos) <= 2, "{x}: {sin} {cos}");
             }
         }
         // The doubles next to zeros and borders of quarters, where the reduction cancels most.
@@ -296,7 +296,7 @@ mod tests {
             for x in [FRAC_PI_4, FRAC_PI_2].map(|unit| unit * f64::from(quarter)) {
                 for x in [x.next_down(), x, x.next_up()] {
                     let ((sin, cos), (their_sin, their_cos)) = (sin_cos(x), x.sin_cos());
-                    assert!(units_apart(sin, their_sin) <= 2 && units_apart(cos, their_cos) <= 2, "{x}: {sin} {cos}");
+                    assert!(ulps_between(sin, their_sin) <= 2 && ulps_between(cos, their_cos) <= 2, "{x}: {sin} {cos}");
                 }
             }
         }
@@ -376,7 +376,7 @@ mod tests {
         for angle in arguments(PI) {
             for scale in [1e-3, 1.0, 7.3] {
                 let (y, x) = (scale * angle.sin(), scale * angle.cos());
-                assert!(units_apart(atan2(y, x), y.atan2(x)) <= 3, "{y} {x}");
+                assert!(ulps_between(atan2(y, x), y.atan2(x)) <= 3, "{y} {x}");
             }
         }
         for (y, x) in [(0.0, 1.0), (-0.0, 1.0), (0.0, -1.0), (0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (1.0, f64::INFINITY)]

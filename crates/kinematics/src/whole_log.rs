@@ -58,8 +58,8 @@ impl Sink for Every<'_> {
     #[inline(always)]
     fn room(&mut self) -> Option<&mut [Pose; GROUP]> {
         let (now, later) = std::mem::take(&mut self.0).split_first_chunk_mut()?;
-        if let Some(soon) = later.get(WRITE_PREFETCH_STEPS..) {
-            soon.first_chunk::<GROUP>().into_iter().for_each(prefetch_write);
+        if let Some(upcoming) = later.get(WRITE_PREFETCH_STEPS..) {
+            upcoming.first_chunk::<GROUP>().into_iter().for_each(prefetch_write);
         }
         self.0 = later;
         Some(now)
@@ -141,10 +141,10 @@ impl<C: Count, S: Sink> Kernel for Walk<'_, C, S> {
         columns.start_from(&self.state);
         let ((left, left_rest), (right, right_rest)) = (counts.left.as_chunks(), counts.right.as_chunks());
         let (mut left, mut right) = (left.chunks_exact(GROUPS), right.chunks_exact(GROUPS));
-        let mut soon = counts.map(|counts| counts.get(READ_PREFETCH_STEPS..).unwrap_or(&[]));
+        let mut upcoming = counts.map(|counts| counts.get(READ_PREFETCH_STEPS..).unwrap_or(&[]));
         for (left, right) in (&mut left).zip(&mut right) {
-            self.block(&mut columns, (Wheels { left, right }, soon), BLOCK);
-            soon = soon.map(|counts| counts.get(BLOCK..).unwrap_or(&[]));
+            self.block(&mut columns, (Wheels { left, right }, upcoming), BLOCK);
+            upcoming = upcoming.map(|counts| counts.get(BLOCK..).unwrap_or(&[]));
         }
         // The groups that are left, and the last filled up by standing still.
         let mut groups = Wheels { left: left.remainder(), right: right.remainder() }.map(|groups| {
@@ -393,14 +393,14 @@ impl<C: Count, S: Sink> Walk<'_, C, S> {
     }
 
     /// A block of which `used` steps are steps. Its displacements are found while the block before is placed
-    /// and its poses are written, group by group: the memory writes while the processor computes. `soon` are
+    /// and its poses are written, group by group: the memory writes while the processor computes. `upcoming` are
     /// the counts whose memory is asked for meanwhile.
     #[inline(always)]
-    fn block(&mut self, columns: &mut Columns, (counts, soon): (Wheels<&[[C; GROUP]]>, Wheels<&[C]>), used: usize) {
+    fn block(&mut self, columns: &mut Columns, (counts, upcoming): (Wheels<&[[C; GROUP]]>, Wheels<&[C]>), used: usize) {
         let (mut before, mut is_within) = (self.state.counts, true);
         for (group, (left, right)) in counts.left.iter().zip(counts.right).enumerate() {
-            for soon in [soon.left, soon.right] {
-                soon.get(group * GROUP..).and_then(<[C]>::first_chunk::<GROUP>).into_iter().for_each(prefetch_read);
+            for upcoming in [upcoming.left, upcoming.right] {
+                upcoming.get(group * GROUP..).and_then(<[C]>::first_chunk::<GROUP>).into_iter().for_each(prefetch_read);
             }
             is_within &= columns.displace(&self.state, before, Wheels { left, right }, group);
             columns.next_group();

@@ -15,7 +15,7 @@ use crate::panel::Panel;
 use crate::series::{Marks, Series};
 
 const INK: &str = "#222222";
-const FAINT_INK: &str = "#555555";
+const SECONDARY_INK: &str = "#555555";
 const GRID: &str = "#e3e3e3";
 /// From a text's vertical middle down to its baseline, by its size.
 const BASELINE: f64 = 0.36;
@@ -43,7 +43,7 @@ pub(crate) fn document(figure: &Figure, layout: &Layout, font: &Font) -> String 
     }
     for (row, line) in layout.caption.iter().enumerate() {
         let y = layout.caption_y + (row as f64 + 0.5) * CAPTION_PX * LINE;
-        page = page.add(text(line, layout.margin, y, CAPTION_PX, "start").set("fill", FAINT_INK));
+        page = page.add(text(line, layout.margin, y, CAPTION_PX, "start").set("fill", SECONDARY_INK));
     }
     let mut document = page.to_string();
     document.push('\n');

@@ -44,9 +44,9 @@ impl Panel {
     }
 
     pub(crate) fn spans(&self) -> (Span, Span) {
-        let reach = |along, scale| self.series.iter().flat_map(|s| s.reach(along, scale)).collect::<Vec<_>>();
+        let extent = |along, scale| self.series.iter().flat_map(|s| s.extent(along, scale)).collect::<Vec<_>>();
         let bars = self.series.iter().any(Series::is_bars);
-        (self.x.span(&reach(Along::X, self.x.scale), false), self.y.span(&reach(Along::Y, self.y.scale), bars))
+        (self.x.span(&extent(Along::X, self.x.scale), false), self.y.span(&extent(Along::Y, self.y.scale), bars))
     }
 
     pub(crate) fn check(&self, figure: &str) -> Result<(), ReportError> {

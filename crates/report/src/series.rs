@@ -155,7 +155,7 @@ impl Series {
     }
 
     /// All values that an automatic range along a direction has to show.
-    pub(crate) fn reach(&self, along: Along, scale: Scale) -> Vec<f64> {
+    pub(crate) fn extent(&self, along: Along, scale: Scale) -> Vec<f64> {
         let mut values: Vec<f64> = self.lists(along).into_iter().flat_map(|(_, list)| list).collect();
         if let (Marks::Points { points, y_error: Some(errors) }, Along::Y) = (&self.marks, along) {
             let ends = points.iter().zip(errors).flat_map(|(&(_, y), error)| [y - error, y + error]);

@@ -34,7 +34,7 @@ const LARGEST_COUNT: f64 = 9_007_199_254_740_992.0;
 const WRAPPED_MARGIN_RAD: f64 = 1e-3;
 /// Poses that all have the same heading are of an instrument of positions if they reach so far in both
 /// directions, metres: a robot that drives on a straight alone does so in one of its own.
-const MIN_REACH_M: f64 = 0.3;
+const MIN_EXTENT_M: f64 = 0.3;
 /// Speeds say nothing of the motion in a gap; this long it is metres, seconds.
 const MAX_GAP_OF_RATES_S: f64 = 1.0;
 
@@ -441,12 +441,12 @@ fn unwrap_angles(wheels: &mut [[f64; 2]]) -> bool {
 /// Is every heading the same, while the robot moves over a plane?
 fn is_heading_constant(readings: &[TruthReading]) -> bool {
     let Some(first) = readings.first().and_then(|reading| reading.theta_rad) else { return false };
-    let reach = |of: fn(&TruthReading) -> f64| {
+    let extent_m = |of: fn(&TruthReading) -> f64| {
         let (least, most) = readings.iter().map(of).fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(x), b.max(x)));
         most - least
     };
     let is_same = readings.iter().all(|reading| reading.theta_rad == Some(first));
-    is_same && reach(|reading| reading.x_m) > MIN_REACH_M && reach(|reading| reading.y_m) > MIN_REACH_M
+    is_same && extent_m(|reading| reading.x_m) > MIN_EXTENT_M && extent_m(|reading| reading.y_m) > MIN_EXTENT_M
 }
 
 fn wheel_log(wheels: &[[f64; 2]], quantity: WheelQuantity, geometry: DriveGeometry, rates: Rates) -> WheelLog {

@@ -16,7 +16,7 @@ use crate::decompress::{decompress, expansion_limit_bytes};
 use crate::error::RosBagError;
 use crate::record_fields::Fields;
 use crate::resync::next_chunk;
-use crate::settings::{MAX_BREAKS, MAX_CHUNK_BYTES, MAX_DECLARED_BYTES, MAX_TOLD};
+use crate::settings::{MAX_BREAKS, MAX_CHUNK_BYTES, MAX_DECLARED_BYTES, MAX_REPORTED};
 
 /// A topic as a file declares it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -44,23 +44,23 @@ impl Channel {
 /// What could not be read.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct Losses {
-    told: Vec<String>,
+    reported: Vec<String>,
     count: usize,
 }
 
 impl Losses {
     pub(crate) fn add(&mut self, loss: String) {
         self.count += 1;
-        if self.told.len() < MAX_TOLD {
-            self.told.push(loss);
+        if self.reported.len() < MAX_REPORTED {
+            self.reported.push(loss);
         }
     }
 
     /// One line a loss; of many the first.
     pub(crate) fn lines(&self) -> Vec<String> {
-        let more = self.count - self.told.len();
+        let more = self.count - self.reported.len();
         let rest = (more > 0).then(|| format!("{more} more places of the bag could not be read"));
-        self.told.iter().cloned().chain(rest).collect()
+        self.reported.iter().cloned().chain(rest).collect()
     }
 }
 
@@ -443,8 +443,8 @@ mod tests {
         let mut records = vec![schema(1, 1 << 20)];
         records.extend((0..200).map(|id| channel(id, 1)));
         records.push(END.to_vec());
-        let told = read(&records, "a.mcap", u64::MAX).expect("read").join("\n");
-        assert!(told.contains("schemas and channels of more than 64 MiB"), "{told}");
+        let reported = read(&records, "a.mcap", u64::MAX).expect("read").join("\n");
+        assert!(reported.contains("schemas and channels of more than 64 MiB"), "{reported}");
         // One that is declared again takes the place of the first.
         let again: Vec<Vec<u8>> = (0..100).map(|_| schema(1, 1 << 20)).chain([END.to_vec()]).collect();
         assert_eq!(read(&again, "a.mcap", u64::MAX).expect("read"), Vec::<String>::new());
@@ -465,11 +465,11 @@ mod tests {
 
     #[test]
     fn lengths_that_lie_lose_their_record_and_cost_no_memory() {
-        let told = |records: &[Vec<u8>]| read(records, "a.mcap", u64::MAX).expect("read").join("\n");
-        assert!(told(&[chunk(&[], u64::MAX), END.to_vec()]).contains("more than 256 MiB"));
-        assert!(told(&[chunk(&[1, 2], 3), END.to_vec()]).contains("2 bytes instead of 3"));
+        let reported = |records: &[Vec<u8>]| read(records, "a.mcap", u64::MAX).expect("read").join("\n");
+        assert!(reported(&[chunk(&[], u64::MAX), END.to_vec()]).contains("more than 256 MiB"));
+        assert!(reported(&[chunk(&[1, 2], 3), END.to_vec()]).contains("2 bytes instead of 3"));
         let endless = [&[op::MESSAGE][..], &u64::MAX.to_le_bytes(), &[0; 20]].concat();
-        assert!(told(&[endless]).contains("goes beyond its end"));
+        assert!(reported(&[endless]).contains("goes beyond its end"));
     }
 
     #[test]
@@ -477,8 +477,8 @@ mod tests {
         // At each break the rest of the file is read: without a limit, a minute for a megabyte.
         let endless = [&[op::MESSAGE][..], &u64::MAX.to_le_bytes()].concat();
         let records: Vec<Vec<u8>> = (0..1000).flat_map(|_| [chunk(&[], 0), endless.clone()]).collect();
-        let told = read(&records, "a.mcap", u64::MAX).expect("read");
-        assert_eq!(told.len(), MAX_TOLD + 1);
-        assert!(told[MAX_TOLD].starts_with("96 more places"), "{told:?}");
+        let reported = read(&records, "a.mcap", u64::MAX).expect("read");
+        assert_eq!(reported.len(), MAX_REPORTED + 1);
+        assert!(reported[MAX_REPORTED].starts_with("96 more places"), "{reported:?}");
     }
 }

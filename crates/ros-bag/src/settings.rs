@@ -55,4 +55,4 @@ pub(crate) const MAX_DEFINITION_BYTES: u64 = 1 << 20;
 
 /// Faults of a file that are told one by one; more are counted.
 /// Convention: a screen holds them.
-pub(crate) const MAX_TOLD: usize = 5;
+pub(crate) const MAX_REPORTED: usize = 5;

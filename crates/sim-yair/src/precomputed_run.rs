@@ -148,15 +148,15 @@ mod tests {
             let [mut precomputed, mut asking] =
                 [(); 2].map(|()| SimulatedRobot::new(&scenario, 5, 7).expect("simulates"));
             // The same buffers for all, as a campaign has it.
-            let (mut run, mut asked) = (Run::default(), Run::default());
+            let (mut run, mut prepared) = (Run::default(), Run::default());
             for program in &programs {
                 let plan = precomputed.prepare(program.clone());
                 assert!(plan.precomputed_run.is_some(), "{}", program.id);
                 precomputed.drive_prepared_into(&plan, &mut run).expect("drives");
                 asking
-                    .drive_prepared_into(&crate::PreparedProgram { precomputed_run: None, ..plan }, &mut asked)
+                    .drive_prepared_into(&crate::PreparedProgram { precomputed_run: None, ..plan }, &mut prepared)
                     .expect("drives");
-                assert_eq!(run, asked);
+                assert_eq!(run, prepared);
                 assert_eq!(precomputed.last_true_ends(), asking.last_true_ends());
             }
         }

@@ -7,9 +7,9 @@ use super::watched::{Row, drive, perfect, rows};
 
 /// A gross fault by its sizes, and how far its best rewriting may be from the faultless log, radians of a
 /// wheel, with the reason.
-type Gross = (&'static str, &'static [(&'static str, f64)], f64);
+type RecordFault = (&'static str, &'static [(&'static str, f64)], f64);
 
-const GROSS: &[Gross] = &[
+const GROSS: &[RecordFault] = &[
     ("swapped_wheels", &[("swapped", 1.0)], 0.0),
     ("reversed_wheel", &[("left", 1.0), ("right", 0.0)], 0.0),
     ("reversed_wheel", &[("left", 0.0), ("right", 1.0)], 0.0),

@@ -66,7 +66,7 @@ fn ratios(
                 runs,
             };
             let truth = robot.true_geometry();
-            estimate(&dataset.session(), truth).expect("an estimate") - lengths_m(truth)
+            estimate(&dataset.session(), truth).expect("an estimate") - geometry_m(truth)
         })
         .collect();
     std::array::from_fn(|parameter| {
@@ -75,7 +75,7 @@ fn ratios(
     })
 }
 
-fn lengths_m(geometry: DriveGeometry) -> Vector3<f64> {
+fn geometry_m(geometry: DriveGeometry) -> Vector3<f64> {
     Vector3::new(geometry.wheel_diameter_m().left, geometry.wheel_diameter_m().right, geometry.wheel_separation_m())
 }
 
@@ -109,12 +109,12 @@ impl Oracle {
             let miss = Vector3::new(seen.x_m - reckoned.x_m, seen.y_m - reckoned.y_m, turn_rad);
             gradient += innovation.slope.transpose() * innovation.precision * miss;
         }
-        lengths_m(truth) + self.covariance * gradient
+        geometry_m(truth) + self.covariance * gradient
     }
 }
 
 fn by_direct(direct: Direct) -> impl Fn(&Session<'_>, DriveGeometry) -> Option<Vector3<f64>> + Sync {
-    move |session, _| direct.calibrate(std::slice::from_ref(session)).ok().map(|found| lengths_m(found.geometry))
+    move |session, _| direct.calibrate(std::slice::from_ref(session)).ok().map(|found| geometry_m(found.geometry))
 }
 
 fn bound(scenario: &Scenario) -> FisherInformation {

@@ -40,12 +40,12 @@ fn true_geometry(simulation: &sim_yair::Simulation) -> DriveGeometry {
 /// Errors of positions alone at the ends of half metres, as OptiOdom's program minimises them.
 const POSITIONS: Segments = Segments { segment_m: 0.5, heading_m: 0.0 };
 
-fn geometry(lengths_m: &Vector3<f64>) -> DriveGeometry {
-    DriveGeometry::new(Wheels { left: lengths_m[0], right: lengths_m[1] }, lengths_m[2]).expect("positive")
+fn geometry(geometry_m: &Vector3<f64>) -> DriveGeometry {
+    DriveGeometry::new(Wheels { left: geometry_m[0], right: geometry_m[1] }, geometry_m[2]).expect("positive")
 }
 
-fn cost_m2(session: &Session<'_>, lengths_m: &Vector3<f64>) -> f64 {
-    POSITIONS.cost(std::slice::from_ref(session), &geometry(lengths_m)).expect("poses").value_m2
+fn cost_m2(session: &Session<'_>, geometry_m: &Vector3<f64>) -> f64 {
+    POSITIONS.cost(std::slice::from_ref(session), &geometry(geometry_m)).expect("poses").value_m2
 }
 
 /// Resilient backpropagation with the settings of OptiOdom's program: steps of 10 µm to 0.25 mm that grow by
@@ -55,11 +55,11 @@ fn cost_m2(session: &Session<'_>, lengths_m: &Vector3<f64>) -> f64 {
 fn rprop(session: &Session<'_>) -> Vector3<f64> {
     const MIN_M: f64 = 1e-5;
     let sessions = std::slice::from_ref(session);
-    let mut lengths_m = Vector3::from(lengths(&session.robot.geometry().expect("nominal")));
+    let mut geometry_m = Vector3::from(lengths(&session.robot.geometry().expect("nominal")));
     let (mut steps_m, mut slopes) = (Vector3::repeat(MIN_M), Vector3::zeros());
     let mut costs: Vec<f64> = Vec::new();
     while costs.len() < 1000 {
-        let cost = POSITIONS.cost(sessions, &geometry(&lengths_m)).expect("poses");
+        let cost = POSITIONS.cost(sessions, &geometry(&geometry_m)).expect("poses");
         costs.push(cost.value_m2);
         for i in 0..3 {
             let turned = cost.gradient_m[i] * slopes[i];
@@ -69,7 +69,7 @@ fn rprop(session: &Session<'_>) -> Vector3<f64> {
             } else if turned < 0.0 {
                 steps_m[i] = (0.5_f64 * steps_m[i]).max(MIN_M);
             }
-            lengths_m[i] -= steps_m[i] * slopes[i].signum();
+            geometry_m[i] -= steps_m[i] * slopes[i].signum();
         }
         if costs.len() >= 30 {
             let mean = |costs: &[f64]| costs.iter().sum::<f64>() / 10.0;
@@ -79,7 +79,7 @@ fn rprop(session: &Session<'_>) -> Vector3<f64> {
             }
         }
     }
-    lengths_m
+    geometry_m
 }
 
 #[test]
@@ -107,18 +107,18 @@ fn optiodom(session: &std::path::Path) -> Dataset {
 /// positions alone near the published values.
 fn minimum(session: &Session<'_>, from: Vector3<f64>) -> Vector3<f64> {
     let sessions = std::slice::from_ref(session);
-    let slope = |lengths_m: &Vector3<f64>| POSITIONS.cost(sessions, &geometry(lengths_m)).expect("poses").gradient_m;
-    let mut lengths_m = from;
+    let slope = |geometry_m: &Vector3<f64>| POSITIONS.cost(sessions, &geometry(geometry_m)).expect("poses").gradient_m;
+    let mut geometry_m = from;
     for _ in 0..12 {
         let mut curvature = nalgebra::Matrix3::zeros();
         for i in 0..3 {
             let mut step = Vector3::zeros();
             step[i] = 1e-6;
-            curvature.set_column(i, &((slope(&(lengths_m + step)) - slope(&(lengths_m - step))) / 2e-6));
+            curvature.set_column(i, &((slope(&(geometry_m + step)) - slope(&(geometry_m - step))) / 2e-6));
         }
-        lengths_m -= curvature.try_inverse().expect("regular") * slope(&lengths_m);
+        geometry_m -= curvature.try_inverse().expect("regular") * slope(&geometry_m);
     }
-    lengths_m
+    geometry_m
 }
 
 /// On all six sessions of circles: the cost at the published values over the least cost, to a hundredth, and

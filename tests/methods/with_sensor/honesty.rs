@@ -119,7 +119,7 @@ fn segments_and_the_filter_find_the_drive_and_know_how_well() {
     let scenario = motion_capture(Pose::IDENTITY);
     let mut trial = Trial::new(&scenario, 17).expect("simulates");
     let truth = trial.true_geometry();
-    let [mut segments, mut found, mut told] = [[Moments::default(); 3]; 3];
+    let [mut segments, mut found, mut logged] = [[Moments::default(); 3]; 3];
     for number in 0..trials {
         let mut session = trial.drive(number.into()).expect("drives");
         let take = |errors: &mut [Moments; 3], found: Result<Calibration, CalibError>| {
@@ -129,12 +129,12 @@ fn segments_and_the_filter_find_the_drive_and_know_how_well() {
             errors.iter_mut().zip(z).for_each(|(errors, z)| errors.push(z));
         };
         take(&mut segments, Segments::DEFAULT.calibrate(std::slice::from_ref(&session)));
-        take(&mut told, AugmentedKalman::DEFAULT.calibrate(std::slice::from_ref(&session)));
+        take(&mut logged, AugmentedKalman::DEFAULT.calibrate(std::slice::from_ref(&session)));
         // What the dataset does not state is estimated.
         session.truth_noise = dataset::TruthNoise::default();
         take(&mut found, AugmentedKalman::DEFAULT.calibrate(std::slice::from_ref(&session)));
     }
-    for (name, errors, most) in [("told", told, 1.0), ("found", found, 1.0), ("segments", segments, 1.3)] {
+    for (name, errors, most) in [("told", logged, 1.0), ("found", found, 1.0), ("segments", segments, 1.3)] {
         let squares = mean_square(&errors, trials);
         let within = 1.0 - 4.0 * se..=most * (1.0 + 4.0 * se);
         assert!(squares.iter().all(|square| within.contains(square)), "{name}: {squares:?}");

@@ -77,15 +77,15 @@ fn row_by_row_the_filter_finds_the_drive_and_its_innovations_are_as_large_as_it_
     let truth = trial.true_geometry();
     let session = trial.drive(0).expect("drives");
     let of = |wheels: f64| [wheels * wheels, sigma_m * sigma_m, sigma_rad * sigma_rad].into();
-    let told = NoiseFilter::new(of(scenario.noise.wheel_sigma_m_per_sqrt_m), [true; 3]);
+    let logged = NoiseFilter::new(of(scenario.noise.wheel_sigma_m_per_sqrt_m), [true; 3]);
     let found = NoiseFilter::new(of(1e-3), [false; 3]);
-    for noise in [told, found] {
+    for noise in [logged, found] {
         let (filter, _, _) = once(&session, noise);
         // 4.5 sigmas, three times over twice: 4e-5.
         assert!(errors_in_sigmas(&filter, &truth).iter().all(|error| error.abs() < 4.5));
         assert!(filter.is_settled());
     }
-    let (_, sum, measurements) = once(&session, told);
+    let (_, sum, measurements) = once(&session, logged);
     assert!((sum - 3.0 * measurements).abs() < 4.5 * (6.0 * measurements).sqrt(), "{sum} of {measurements}");
     let half = NoiseFilter::new(of(0.5 * scenario.noise.wheel_sigma_m_per_sqrt_m), [true; 3]);
     let (_, sum, measurements) = once(&session, half);

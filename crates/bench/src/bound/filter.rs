@@ -136,13 +136,13 @@ impl<'a> Filter<'a> {
     }
 
     fn measure(&mut self, measurement: usize, t_s: f64) -> Result<(), NoBound> {
-        let seen = self.model.instruments[measurement].covariance(self.world_from_body);
+        let measured = self.model.instruments[measurement].covariance(self.world_from_body);
         if std::mem::take(&mut self.lost) {
-            self.covariance.fixed_view_mut::<3, 3>(POSE, POSE).copy_from(&seen);
-            self.largest_var = seen.diagonal();
+            self.covariance.fixed_view_mut::<3, 3>(POSE, POSE).copy_from(&measured);
+            self.largest_var = measured.diagonal();
             return Ok(());
         }
-        let covariance = self.covariance.fixed_view::<3, 3>(POSE, POSE) + seen;
+        let covariance = self.covariance.fixed_view::<3, 3>(POSE, POSE) + measured;
         let precision = self.invert(&covariance).ok_or(NoBound::NoError { t_s })?;
         let slope: Matrix3<f64> = self.slope.fixed_columns::<3>(POSE).transpose();
         self.innovations.push(LinearizedInnovation { t_s, slope, covariance, precision });

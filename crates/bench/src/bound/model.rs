@@ -89,7 +89,7 @@ impl Model {
     }
 
     /// Speed and acceleration of the wheel with more counts to go, counts/s and counts/s².
-    pub(super) fn pace_counts(&self, counts: Wheels<f64>) -> (f64, f64) {
+    pub(super) fn speed_and_acceleration_of_counts(&self, counts: Wheels<f64>) -> (f64, f64) {
         let m_per_count = self.nominal_m_per_count();
         let longest = counts.left.abs().max(counts.right.abs());
         let speed = |counts: f64, m_per_count: f64| self.robot.cruise_speed_m_s / m_per_count * counts.abs() / longest;
@@ -170,11 +170,11 @@ mod tests {
     fn two_marks_across_the_axle_give_the_textbook_pose() {
         let grid = Instrument::FloorGrid { resolution_m: 0.0, reading_sigma_m: 2e-3 };
         let measurement = PoseInstrument::of(&grid, &[mark(0.0, 0.2), mark(0.0, -0.2)]).expect("two marks");
-        let seen = measurement.covariance(Pose::new(3.0, -1.0, 0.7));
+        let measured = measurement.covariance(Pose::new(3.0, -1.0, 0.7));
         // Each coordinate of the middle σ²/2, the heading 2σ²/w²; one part in 1e15 a rounding, a dozen of
         // them.
         let expected = Matrix3::from_diagonal(&Vector3::new(2e-6, 2e-6, 2.0 * 4e-6 / 0.16));
-        assert!((seen - expected).abs().max() < 1e-18, "{seen}");
+        assert!((measured - expected).abs().max() < 1e-18, "{measured}");
         assert_eq!(PoseInstrument::of(&grid, &[mark(0.1, 0.2), mark(0.1, 0.2)]), Err(NoBound::NoHeading));
     }
 
@@ -202,10 +202,10 @@ mod tests {
         };
         // A marker 0.5 m ahead of a body that heads north: a heading too large puts the body too far east.
         let ahead = PoseInstrument::of(&capture(0.5, 0.0), &[]).expect("always");
-        let seen = ahead.covariance(Pose::new(0.0, 0.0, std::f64::consts::FRAC_PI_2));
-        assert!((seen[(0, 0)] - (9e-8 + 0.25 * 4e-6)).abs() < 1e-18);
-        assert!((seen[(1, 1)] - 9e-8).abs() < 1e-18);
-        assert!((seen[(0, 2)] - 0.5 * 4e-6).abs() < 1e-18, "{seen}");
+        let measured = ahead.covariance(Pose::new(0.0, 0.0, std::f64::consts::FRAC_PI_2));
+        assert!((measured[(0, 0)] - (9e-8 + 0.25 * 4e-6)).abs() < 1e-18);
+        assert!((measured[(1, 1)] - 9e-8).abs() < 1e-18);
+        assert!((measured[(0, 2)] - 0.5 * 4e-6).abs() < 1e-18, "{measured}");
         // To the left of a body that heads east: the same.
         let left = PoseInstrument::of(&capture(0.0, 0.5), &[]).expect("always");
         assert!((left.covariance(Pose::IDENTITY)[(0, 2)] - 0.5 * 4e-6).abs() < 1e-18);

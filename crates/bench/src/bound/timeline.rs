@@ -114,7 +114,7 @@ impl Run<'_> {
         if longest <= 0.0 {
             return;
         }
-        let (speed, acceleration) = self.model.pace_counts(counts);
+        let (speed, acceleration) = self.model.speed_and_acceleration_of_counts(counts);
         let time_scale = TimeScale::of(longest, speed, self.model.ramps.then_some(acceleration));
         let before = self.phase;
         for side in Side::BOTH {

@@ -332,7 +332,7 @@ mod tests {
 
     #[test]
     fn keys_say_their_units() {
-        let said = |key| {
+        let text_of = |key| {
             let (name, unit) = with_unit(key);
             format!("{name} [{unit}]")
         };
@@ -346,6 +346,6 @@ mod tests {
             "right over left []",
             "m []",
         ];
-        assert_eq!(keys.map(said), expected);
+        assert_eq!(keys.map(text_of), expected);
     }
 }

@@ -24,7 +24,7 @@ use crate::settings::{MIN_COMMON_SCALE_COMPONENT, MIN_NAMED_COMPONENT};
 use crate::estimate::{
     CalibError, Calibration, Covariance, Extrinsics, GroupInstrument, Method, NotObservable, OdometryNoise, Parameter,
     Rejected,
-    covariance_of_lengths, drive, nominal,};
+    geometry_covariance, drive, nominal,};
 
 /// The method with the settings of its fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -112,10 +112,10 @@ pub fn calibrated_drive(
     let Model { m_per_rad, separation_m, .. } = fit.solution.model;
     let geometry = drive(Joint::NAME, m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), separation_m)?;
     let diameter_m = geometry.wheel_diameter_m();
-    let lengths_m = [diameter_m.left, diameter_m.right, separation_m];
+    let geometry_m = [diameter_m.left, diameter_m.right, separation_m];
     Ok(Calibration {
         covariance: covariance
-            .map(|covariance| covariance_of_lengths(|row, column| covariance[(row, column)], lengths_m)),
+            .map(|covariance| geometry_covariance(|row, column| covariance[(row, column)], geometry_m)),
         noise: Some(noise(fit)),
         not_observable: not_observable(fit),
         runs_used: fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).count(),

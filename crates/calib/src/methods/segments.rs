@@ -19,7 +19,7 @@ use motion_programs::Schedule;
 use nalgebra::{DVector, Dyn, Matrix3, Matrix3xX, OMatrix, Owned, U3, Vector3};
 
 use crate::dead_reckoning_jacobian::{DeadReckoned, GeometryParameters, unobservable};
-use crate::estimate::{CalibError, Calibration, Method, covariance_of_lengths, drive, nominal};
+use crate::estimate::{CalibError, Calibration, Method, geometry_covariance, drive, nominal};
 use crate::pose_measurements::{PoseMeasurement, PoseMeasurements, Spacing};
 use crate::settings::{HEADING_WEIGHT_M, MIN_SENSITIVITY, SEGMENT_M};
 
@@ -141,16 +141,16 @@ impl Segments {
     pub fn cost(&self, sessions: &[Session<'_>], geometry: &DriveGeometry) -> Result<Cost, CalibError> {
         let (paths, _) = PoseMeasurements::of_all(Self::NAME, sessions, self.spacing())?;
         let radius_m = geometry.m_per_rad();
-        let lengths_m = Vector3::new(radius_m.left, radius_m.right, geometry.wheel_separation_m());
+        let geometry_m = Vector3::new(radius_m.left, radius_m.right, geometry.wheel_separation_m());
         let errors =
-            PathErrors { paths: &paths, nominal: lengths_m, heading_m: self.heading_m, factors: Vector3::repeat(1.0) };
+            PathErrors { paths: &paths, nominal: geometry_m, heading_m: self.heading_m, factors: Vector3::repeat(1.0) };
         let mut cost = Cost { value_m2: 0.0, gradient_m: Vector3::zeros() };
         errors.for_each_end(|_, error, by_factors| {
             cost.value_m2 += error.norm_squared();
             cost.gradient_m += 2.0 * by_factors.transpose() * error;
         });
         // A factor of a radius is one of its diameter.
-        cost.gradient_m.component_div_assign(&lengths_m.component_mul(&Vector3::new(2.0, 2.0, 1.0)));
+        cost.gradient_m.component_div_assign(&geometry_m.component_mul(&Vector3::new(2.0, 2.0, 1.0)));
         Ok(cost)
     }
 }
@@ -225,9 +225,9 @@ impl Method for Segments {
         let normal: Matrix3<f64> = shares.iter().map(|share| share.normal).sum();
         observable(&normal)?;
 
-        let lengths_m = nominal.component_mul(&Vector3::new(2.0, 2.0, 1.0)).into();
+        let geometry_m = nominal.component_mul(&Vector3::new(2.0, 2.0, 1.0)).into();
         let covariance = covariance(&shares, &normal)
-            .map(|covariance| covariance_of_lengths(|row, column| covariance[(row, column)], lengths_m));
+            .map(|covariance| geometry_covariance(|row, column| covariance[(row, column)], geometry_m));
         let GeometryParameters { m_per_rad, separation_m } = errors.geometry_parameters();
         let geometry = drive(Self::NAME, m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), separation_m)?;
         Ok(Calibration {

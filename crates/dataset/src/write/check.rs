@@ -134,8 +134,8 @@ fn check_run(dataset: &Dataset, first: Discriminant<WheelLog>, run: &Run) -> Che
     for heading in &run.headings {
         finite("heading", heading.theta_rad)?;
         positive("a heading's standard deviation", heading.sigma_rad)?;
-        let is_apart = run.truth.binary_search_by(|sample| sample.t_s.total_cmp(&heading.t_s)).is_err();
-        ensure(is_apart, || format!("a heading and a pose at {} s", heading.t_s))?;
+        let is_unpaired = run.truth.binary_search_by(|sample| sample.t_s.total_cmp(&heading.t_s)).is_err();
+        ensure(is_unpaired, || format!("a heading and a pose at {} s", heading.t_s))?;
     }
     increasing("wheel_reference", run.wheel_reference.iter().map(|speed| speed.t_s))?;
     let speeds = run.wheel_reference.iter().flat_map(|speed| [speed.speed_m_s.left, speed.speed_m_s.right]);

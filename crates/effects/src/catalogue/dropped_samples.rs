@@ -120,10 +120,10 @@ struct Missing {
 /// Rows from each row to the next: more than one where rows are missing between them. By the beat, as stamps
 /// may jitter, and whether that is uncertain; by time where there is none. One that came by itself is none.
 fn rows_after(t_s: &[f64]) -> Option<(Vec<f64>, bool)> {
-    if let Some(beat) = SamplingPeriod::of(t_s) {
-        let square_s2 = beat.late_s.iter().map(|late_s| late_s * late_s).sum::<f64>() / t_s.len() as f64;
-        let uncertain = square_s2.sqrt() > MAX_LATE_SHARE * beat.period_s;
-        return Some((beat.numbers.windows(2).map(|pair| (pair[1] - pair[0]) as f64).collect(), uncertain));
+    if let Some(period) = SamplingPeriod::of(t_s) {
+        let square_s2 = period.late_s.iter().map(|late_s| late_s * late_s).sum::<f64>() / t_s.len() as f64;
+        let uncertain = square_s2.sqrt() > MAX_LATE_SHARE * period.period_s;
+        return Some((period.numbers.windows(2).map(|pair| (pair[1] - pair[0]) as f64).collect(), uncertain));
     }
     let lengths_s: Vec<f64> = t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let usual_s = median(lengths_s.clone()).filter(|usual_s| *usual_s > 0.0)?;

@@ -116,7 +116,7 @@ struct State {
 }
 
 impl State {
-    fn held_m_s2(&self, sliding_m_s: f64) -> f64 {
+    fn friction_m_s2(&self, sliding_m_s: f64) -> f64 {
         let TractionLoss { static_friction, kinetic_friction, stribeck_speed_m_s } = self.effect;
         let excess = (static_friction - kinetic_friction) * (-sliding_m_s.abs() / stribeck_speed_m_s).exp();
         GRAVITY_M_S2 * (kinetic_friction + excess)
@@ -128,7 +128,7 @@ impl State {
     fn slide(&mut self, side: Side, speed_m_s: f64, dt_s: f64) -> f64 {
         let before_m_s = self.ground_m_s[side];
         let gap_m_s = speed_m_s - before_m_s;
-        let gain_m_s = self.held_m_s2(gap_m_s) * dt_s;
+        let gain_m_s = self.friction_m_s2(gap_m_s) * dt_s;
         if gap_m_s.abs() <= gain_m_s {
             self.ground_m_s[side] = speed_m_s;
             self.sliding[side] = false;
@@ -220,12 +220,12 @@ struct Term {
     ground_m_s: Wheels<f64>,
     /// Distance that each wheel has lost while the floor had not given way yet: a floor that holds all that
     /// is asked of it is none of this effect. `None` once it has.
-    held_m: Option<Wheels<f64>>,
+    pending_m: Option<Wheels<f64>>,
 }
 
 impl Term {
     fn new(grip_m_s2: f64) -> Self {
-        Self { grip_m_s2, ground_m_s: Wheels::both(0.0), held_m: Some(Wheels::both(0.0)) }
+        Self { grip_m_s2, ground_m_s: Wheels::both(0.0), pending_m: Some(Wheels::both(0.0)) }
     }
 
     /// How fast the ground gains on a tread that is so much faster, m/s².
@@ -281,14 +281,14 @@ impl ModelTerm for Term {
             let acceleration_m_s2 = if interval.dt_s > 0.0 { gained_m_s[side] / interval.dt_s } else { 0.0 };
             self.slide(side, interval.dt_s, start_m_s[side], acceleration_m_s2)
         });
-        if let Some(held_m) = self.held_m {
-            lost_m = lost_m.zip_with(held_m, |lost_m, held_m| lost_m + held_m);
+        if let Some(pending_m) = self.pending_m {
+            lost_m = lost_m.zip_with(pending_m, |lost_m, pending_m| lost_m + pending_m);
             let yields = |side| (end_m_s[side] - self.ground_m_s[side]).abs() > TREAD_JITTER_M_S;
             if !Side::BOTH.into_iter().any(yields) {
-                self.held_m = Some(lost_m);
+                self.pending_m = Some(lost_m);
                 return;
             }
-            self.held_m = None;
+            self.pending_m = None;
         }
         gradient[0] = interval.change(lost_m.map(|lost_m| -lost_m));
     }
@@ -329,7 +329,7 @@ mod tests {
         assert!((ground_m - tread_m).abs() < 1e-12, "0.5 m/s² is under 0.1 g");
         let (ground_m, tread_m) = start(3.0);
         // Between the loss under μ_s throughout and under μ_k throughout: v²/2·(1/a_held − 1/a).
-        let loss = |held_m_s2: f64| 0.08 * (1.0 / held_m_s2 - 1.0 / 3.0);
+        let loss = |friction_m_s2: f64| 0.08 * (1.0 / friction_m_s2 - 1.0 / 3.0);
         let lost_m = tread_m - ground_m;
         assert!(lost_m > loss(0.1 * GRAVITY_M_S2) && lost_m < loss(0.06 * GRAVITY_M_S2), "{lost_m}");
     }

@@ -26,7 +26,7 @@ impl PreviousIntervals {
     pub(super) const NONE: Self = Self { memory: MotionHistoryTracker::NONE };
 
     /// The middle of an interval that takes time.
-    pub(super) fn moment<'i>(&mut self, interval: &Interval<'i>) -> KinematicSample<'i> {
+    pub(super) fn sample<'i>(&mut self, interval: &Interval<'i>) -> KinematicSample<'i> {
         let Increment { distance_m, turn_rad } = interval.increment();
         let wheel_m_s = interval.speed_m_s;
         let Increment { distance_m: v_m_s, turn_rad: omega_rad_s } =
@@ -79,7 +79,7 @@ impl ModelTerm for Recorded {
 
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
         if interval.dt_s > 0.0 && !self.of.channel.is_of_instrument() {
-            let at = self.past.moment(interval);
+            let at = self.past.sample(interval);
             gradient[0] = if self.of.channel.is_of_wheels() {
                 interval.change(self.of.of_wheels(self.of.channel, &at).map(|product| product * interval.dt_s))
             } else {

@@ -33,7 +33,7 @@ impl Sparse {
     /// Whether it goes with what is found once for all products of an interval: those do that add to the
     /// motion or to the wheels' travel, but for what goes with rows.
     #[must_use]
-    pub fn shares_moments(&self) -> bool {
+    pub fn shares_samples(&self) -> bool {
         !self.channel.is_of_instrument() && !self.is_of_rows()
     }
 

@@ -100,7 +100,7 @@ pub(super) fn render(robot: &CalibratedRobot, options: &Options) -> Result<Strin
         ("@COVARIANCE@", covariance.step),
         ("@CHORD@", chord.to_owned()),
         ("@STEP@", inputs.function.to_owned()),
-        ("@TOLD@", inputs.told.to_owned()),
+        ("@TOLD@", inputs.logged.to_owned()),
         ("@INPUTS_PARAMETER@", inputs.parameter.to_owned()),
         ("@WITHOUT_INPUTS@", inputs.without.to_owned()),
         ("@UNUSED@", if is_timed { String::new() } else { "    (void)dt_s;\n".to_owned() }),

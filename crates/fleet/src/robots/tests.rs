@@ -12,7 +12,7 @@ const SIGMA_M: f64 = 1e-4;
 
 /// A session with a left wheel of 0.1 m and so many standard deviations more.
 fn session(dataset: &str, robot_id: Option<&str>, day: Option<i64>, left_sigmas: f64) -> FleetSession {
-    let lengths_m = [0.1 + left_sigmas * SIGMA_M, 0.1, 0.3];
+    let geometry_m = [0.1 + left_sigmas * SIGMA_M, 0.1, 0.3];
     let covariance = [0, 1, 2].map(|row| [0, 1, 2].map(|column| if row == column { SIGMA_M * SIGMA_M } else { 0.0 }));
     FleetSession {
         dataset: dataset.to_owned(),
@@ -30,7 +30,7 @@ fn session(dataset: &str, robot_id: Option<&str>, day: Option<i64>, left_sigmas:
             runs: 1,
             drift_percent: SessionDrift { nominal: None, calibrated: None, why_null: None },
             geometry: GeometryEstimate {
-                value_m: lengths_m.map(Some),
+                value_m: geometry_m.map(Some),
                 covariance_m2: Some(covariance),
                 not_observable: Vec::new(),
             },

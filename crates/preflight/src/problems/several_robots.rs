@@ -20,22 +20,22 @@ pub(crate) fn found(sessions: &[SessionCheck]) -> Option<Problem> {
             let geometry = session.matched.as_ref()?.geometry?;
             // What is wrong with a session's wheels has been said of it.
             let sound = geometry.m_per_rad.left * geometry.m_per_rad.right > 0.0;
-            let lengths_m = [
+            let geometry_m = [
                 2.0 * geometry.m_per_rad.left.abs(),
                 2.0 * geometry.m_per_rad.right.abs(),
                 geometry.separation_m.abs(),
             ];
-            sound.then_some((lengths_m, geometry.sigma, session.name.as_str()))
+            sound.then_some((geometry_m, geometry.sigma, session.name.as_str()))
         })
         .collect();
     let mut worst: Option<(f64, f64, Kind)> = None;
     for (first, a) in estimates.iter().enumerate() {
         for b in &estimates[first + 1..] {
             for (at, (parameter, same)) in PARAMETERS.iter().enumerate() {
-                let apart = (a.0[at] / b.0[at]).ln().abs();
-                let sigmas = (apart - same) / a.1[at].hypot(b.1[at]).max(1e-9);
-                let ratio = apart / same;
-                if apart > *same && sigmas > CERTAIN_SIGMAS && worst.as_ref().is_none_or(|worst| ratio > worst.0) {
+                let log_ratio = (a.0[at] / b.0[at]).ln().abs();
+                let sigmas = (log_ratio - same) / a.1[at].hypot(b.1[at]).max(1e-9);
+                let ratio = log_ratio / same;
+                if log_ratio > *same && sigmas > CERTAIN_SIGMAS && worst.as_ref().is_none_or(|worst| ratio > worst.0) {
                     let kind = Kind::SeveralRobots {
                         parameter,
                         sessions: [a.2.to_owned(), b.2.to_owned()],

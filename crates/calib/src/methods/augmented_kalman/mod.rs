@@ -27,7 +27,7 @@ pub use follow::{Followed, settled_at};
 pub use noise::{NoiseFilter, NoiseSource, Variances};
 
 use crate::dead_reckoning_jacobian::unobservable;
-use crate::estimate::{CalibError, Calibration, Method, covariance_of_lengths, drive, nominal};
+use crate::estimate::{CalibError, Calibration, Method, geometry_covariance, drive, nominal};
 use crate::pose_measurements::{PoseMeasurement, PoseMeasurements, Spacing};
 use crate::settings::{
     FACTOR_PRIOR_SIGMA, HEADING_SIGMA_GUESS_RAD, MAX_PASSES, MAX_POSTERIOR_TO_PRIOR_SIGMA, MEASUREMENT_SPACING_M,
@@ -122,12 +122,12 @@ impl AugmentedKalman {
 
     /// Passes until factors and variances stay; false when they do not.
     fn iterate(&self, runs: &[PoseMeasurements<'_>], nominal: &DriveGeometry, guess: NoiseFilter) -> (Pass, bool) {
-        let mut best = self.pass(runs, nominal, Vector3::repeat(1.0), guess.held_at(*guess.variances()));
+        let mut best = self.pass(runs, nominal, Vector3::repeat(1.0), guess.fixed_at(*guess.variances()));
         let mut share = 1.0;
         for _ in 0..MAX_PASSES {
             // The same variances from where the factors came to, before they are compared with others from
             // there.
-            let again = self.pass(runs, nominal, best.factors, guess.held_at(*best.noise.variances()));
+            let again = self.pass(runs, nominal, best.factors, guess.fixed_at(*best.noise.variances()));
             let settled = (0..3).all(|i| {
                 (again.factors[i] - best.factors[i]).abs() <= PASS_TOLERANCE * again.covariance[(i, i)].sqrt()
             });
@@ -140,7 +140,7 @@ impl AugmentedKalman {
                 return (best, true);
             }
             let variances = best.noise.variances().zip_map(&step, |variance, step| variance * step.exp());
-            let tried = self.pass(runs, nominal, best.factors, guess.held_at(variances));
+            let tried = self.pass(runs, nominal, best.factors, guess.fixed_at(variances));
             if tried.noise.log_posterior() >= best.noise.log_posterior() {
                 best = tried;
                 share = (2.0_f64 * share).min(1.0);
@@ -180,9 +180,9 @@ impl Method for AugmentedKalman {
             geometry.wheel_diameter_m().zip_with(Wheels { left, right }, |nominal_m, factor| nominal_m * factor);
         let found = drive(Self::NAME, diameter_m, geometry.wheel_separation_m() * separation)?;
         let nominal_m = geometry.wheel_diameter_m();
-        let lengths_m = [nominal_m.left, nominal_m.right, geometry.wheel_separation_m()];
+        let geometry_m = [nominal_m.left, nominal_m.right, geometry.wheel_separation_m()];
         Ok(Calibration {
-            covariance: Some(covariance_of_lengths(|row, column| pass.covariance[(row, column)], lengths_m)),
+            covariance: Some(geometry_covariance(|row, column| pass.covariance[(row, column)], geometry_m)),
             runs_used: runs.len(),
             runs_rejected,
             converged: settles && pass.stopped,

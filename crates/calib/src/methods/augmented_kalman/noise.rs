@@ -72,7 +72,7 @@ impl NoiseFilter {
 
     /// The same guess with other variances, which are fixed while information is summed: for another pass
     /// over the same measurements.
-    pub(super) fn held_at(&self, variances: Variances) -> Self {
+    pub(super) fn fixed_at(&self, variances: Variances) -> Self {
         Self { variances, adapting: false, ..Self::new(self.guess, self.known) }
     }
 
@@ -106,7 +106,7 @@ impl NoiseFilter {
 
     /// Solves for the variances; those at a bound of their range are fixed there.
     fn solve(&mut self) {
-        let mut held = self.known;
+        let mut fixed = self.known;
         loop {
             let (mut information, mut information_vector) = (self.information, self.information_vector);
             for i in 0..3 {
@@ -114,8 +114,8 @@ impl NoiseFilter {
                 information[(i, i)] += prior;
                 information_vector[i] += prior * self.guess[i];
             }
-            for i in (0..3).filter(|i| held[*i]) {
-                for j in (0..3).filter(|j| !held[*j]) {
+            for i in (0..3).filter(|i| fixed[*i]) {
+                for j in (0..3).filter(|j| !fixed[*j]) {
                     information_vector[j] -= information[(j, i)] * self.variances[i];
                     information[(j, i)] = 0.0;
                     information[(i, j)] = 0.0;
@@ -128,7 +128,7 @@ impl NoiseFilter {
             let Some(variances) = information.lu().solve(&information_vector) else { return };
             let outside = |i: usize| {
                 let (least, most) = (self.guess[i] / MAX_NOISE_FACTOR, self.guess[i] * MAX_NOISE_FACTOR);
-                (!held[i] && !(least..=most).contains(&variances[i])).then(|| variances[i].clamp(least, most))
+                (!fixed[i] && !(least..=most).contains(&variances[i])).then(|| variances[i].clamp(least, most))
             };
             let beyond: Vec<(usize, f64)> = (0..3).filter_map(|i| Some((i, outside(i)?))).collect();
             if beyond.is_empty() {
@@ -136,7 +136,7 @@ impl NoiseFilter {
                 return;
             }
             for (i, border) in beyond {
-                held[i] = true;
+                fixed[i] = true;
                 self.variances[i] = border;
             }
         }
@@ -212,7 +212,7 @@ mod tests {
     fn scored(measurements: &[(Vector3<f64>, Expected)], known: [bool; 3]) -> NoiseFilter {
         let mut filter = NoiseFilter { known, ..guess() };
         for _ in 0..30 {
-            filter = filter.held_at(*filter.variances());
+            filter = filter.fixed_at(*filter.variances());
             measurements.iter().for_each(|(innovation, expected)| filter.measurement(innovation, expected));
             let variances = filter.variances().zip_map(&filter.step(), |variance, step| variance * step.exp());
             filter.variances = variances;
@@ -274,7 +274,7 @@ mod tests {
     fn the_gradient_is_that_of_the_log_posterior_and_would_not_pass_wrong() {
         let measurements = measurements();
         let at = |variances: Variances| {
-            let mut filter = guess().held_at(variances);
+            let mut filter = guess().fixed_at(variances);
             measurements.iter().for_each(|(innovation, expected)| filter.measurement(innovation, expected));
             filter
         };

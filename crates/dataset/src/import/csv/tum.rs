@@ -37,7 +37,7 @@ const UNIT_LENGTH: std::ops::RangeInclusive<f64> = 0.9..=1.1;
 
 /// Poses that all have the same heading are of an instrument of positions if they reach so far in both
 /// directions, metres: a robot that drives on a straight alone does so in one of its own.
-const MIN_REACH_M: f64 = 0.3;
+const MIN_EXTENT_M: f64 = 0.3;
 
 /// Motion sideways over motion, root mean squares, from which on it is remarked: a differential drive's
 /// centre has none, and a frame 0.05 rad off the axle's shows so much.
@@ -181,15 +181,15 @@ fn read_poses(file: &Path, remarks: &mut Vec<String>) -> Result<Part, DatasetErr
 
 /// Is every heading the same, while the robot moves over a plane?
 fn is_heading_constant(pose: &PoseColumns) -> bool {
-    let reach = |values: &[f64]| {
+    let extent_m = |values: &[f64]| {
         let finite = values.iter().copied().filter(|value| value.is_finite());
         let (least, most) =
             finite.fold((f64::MAX, f64::MIN), |(least, most), value| (least.min(value), most.max(value)));
         most - least
     };
     pose.theta.iter().all(|theta| *theta == pose.theta[0])
-        && reach(&pose.x) > MIN_REACH_M
-        && reach(&pose.y) > MIN_REACH_M
+        && extent_m(&pose.x) > MIN_EXTENT_M
+        && extent_m(&pose.y) > MIN_EXTENT_M
 }
 
 /// Twists over the intervals between the poses of the robot's own dead reckoning.

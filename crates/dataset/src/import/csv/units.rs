@@ -14,14 +14,14 @@ use crate::unit::Unit;
 
 /// Poses and wheels tell of the same motion where they reach equally far within this factor. Nominal and true
 /// wheels differ by a few per cent; units differ by at least 1.45 (rad/s and m against deg/s and inches).
-const SAME_REACH: f64 = 1.2;
+const MAX_EQUAL_EXTENT_RATIO: f64 = 1.2;
 
 /// From here on a user should look, though the units are known: counts of a turn are mistaken by a factor of
 /// 2 or 4, diameters and radii by 2.
-const STRANGE_REACH: f64 = 1.5;
+const MAX_USUAL_EXTENT_RATIO: f64 = 1.5;
 
 /// Below this reach, metres, wheels say nothing of the unit of length: a spin wanders so far.
-const MIN_REACH_M: f64 = 0.1;
+const MIN_EXTENT_M: f64 = 0.1;
 
 /// Turns between two poses that say something of the unit of angle, radians: well above the noise of
 /// headings, and not so long that the nominal robot's error passes for another turn.
@@ -182,7 +182,7 @@ fn dead_reckoned(parts: &[Part], run: &RawRun, units: WheelUnits, drive: &Drive)
 }
 
 /// The largest distance from the first of some positions.
-fn reach(positions: impl Iterator<Item = (f64, f64)>) -> f64 {
+fn extent_m(positions: impl Iterator<Item = (f64, f64)>) -> f64 {
     let mut positions = positions.peekable();
     let Some(&(x, y)) = positions.peek() else { return 0.0 };
     positions.map(|position| (position.0 - x).hypot(position.1 - y)).fold(0.0, f64::max)
@@ -204,11 +204,11 @@ pub(super) fn units(parts: &[Part], runs: &[RawRun], options: &Options, drive: &
         for (run, poses) in runs.iter().zip(poses) {
             let pose = parts[run.truth_part].log.pose.as_ref();
             let position = |&row: &usize| pose.map(|pose| (pose.x[row], pose.y[row]));
-            seen += reach(run.truth_rows.iter().take(poses.len()).filter_map(position));
-            reckoned += reach(poses.iter().map(|pose| (pose.x_m, pose.y_m)));
+            seen += extent_m(run.truth_rows.iter().take(poses.len()).filter_map(position));
+            reckoned += extent_m(poses.iter().map(|pose| (pose.x_m, pose.y_m)));
         }
         for &length in &lengths {
-            let ratio = (reckoned >= MIN_REACH_M && seen > 0.0).then(|| length.to_si(seen) / reckoned);
+            let ratio = (reckoned >= MIN_EXTENT_M && seen > 0.0).then(|| length.to_si(seen) / reckoned);
             readings.push((*units, length, ratio, poses));
         }
     }
@@ -216,13 +216,13 @@ pub(super) fn units(parts: &[Part], runs: &[RawRun], options: &Options, drive: &
     let is_open = readings.len() > 1;
     let mut remark = None;
     let fitting: Vec<_> = if is_open {
-        readings.iter().filter(|reading| fits(&reading.2, SAME_REACH)).collect()
+        readings.iter().filter(|reading| fits(&reading.2, MAX_EQUAL_EXTENT_RATIO)).collect()
     } else {
         readings.iter().collect()
     };
     let &&(units, length, ratio, poses) = match &fitting[..] {
         [one] => one,
-        _ => return Err(undecided_reach(part, truth, &readings, &fitting)),
+        _ => return Err(undecided_extent(part, truth, &readings, &fitting)),
     };
     if let Some(ratio) = ratio {
         let why = format!("poses reach {ratio:.3} times as far as wheels");
@@ -232,7 +232,7 @@ pub(super) fn units(parts: &[Part], runs: &[RawRun], options: &Options, drive: &
         if wheels.len() > 1 {
             wheels_by = Basis::new(Confidence::Likely, why);
         }
-        if !is_open && !fits(&Some(ratio), STRANGE_REACH) {
+        if !is_open && !fits(&Some(ratio), MAX_USUAL_EXTENT_RATIO) {
             remark = Some(format!(
                 "the poses reach {ratio:.3} times as far as the wheels by the nominal robot; look at the units, --wheel and --ticks-per-rev"
             ));
@@ -256,7 +256,7 @@ fn known_or(chosen: &Chosen, flag: Option<Unit>, name: &str, all: &[Unit]) -> (V
 /// each run.
 type Reading<'a> = (WheelUnits, Unit, Option<f64>, &'a Vec<Vec<Pose>>);
 
-fn undecided_reach(part: &Part, truth: &Part, all: &[Reading<'_>], fitting: &[&Reading<'_>]) -> DatasetError {
+fn undecided_extent(part: &Part, truth: &Part, all: &[Reading<'_>], fitting: &[&Reading<'_>]) -> DatasetError {
     let many_wheels = all.iter().any(|reading| reading.0 != all[0].0);
     let many_lengths = all.iter().any(|reading| reading.1 != all[0].1);
     let name = |reading: &Reading<'_>| match (many_wheels, many_lengths) {

@@ -20,7 +20,7 @@ pub(super) struct Inputs {
     pub(super) step: String,
     pub(super) function: &'static str,
     pub(super) parameter: &'static str,
-    pub(super) told: &'static str,
+    pub(super) logged: &'static str,
     pub(super) without: &'static str,
 }
 
@@ -90,7 +90,7 @@ impl Inputs {
             step: String::new(),
             function: "yair_odometry_step",
             parameter: "",
-            told: "",
+            logged: "",
             without: "",
         };
         if inputs.used.is_empty() {
@@ -114,7 +114,7 @@ impl Inputs {
         }
         inputs.function = "yair_odometry_step_with";
         inputs.parameter = ", const yair_inputs_t *inputs";
-        inputs.told = ", with what is told of them";
+        inputs.logged = ", with what is told of them";
         inputs.without = WITHOUT;
         inputs
     }

@@ -92,7 +92,7 @@ impl ModelTerm for ProductBatch {
         if interval.dt_s <= 0.0 {
             return;
         }
-        let at = self.past.moment(interval);
+        let at = self.past.sample(interval);
         self.find(&at);
         for (gradient, (channel, product)) in gradient.iter_mut().zip(&self.on) {
             let gained = self.products[*product].map(|product| product * interval.dt_s);
@@ -130,7 +130,7 @@ mod tests {
         all.extend(Channel::WHEELS.map(|channel| on(channel, &vec![WheelSpeed, AbsWheelSpeed])));
         all.push(on(Channel::RightWheel, &vec![CosPhase(Side::Right, 5)]));
         let mut each: Vec<Box<dyn ModelTerm>> = all.iter().map(Sparse::term).collect();
-        let mut together = Sparse::together(&all).expect("of the motion and the wheels");
+        let mut product_batch = Sparse::batched(&all).expect("of the motion and the wheels");
         let run = RunInfo::default();
         // On, back, and standing in no time.
         for (number, (left_rad, right_rad, dt_s)) in
@@ -156,7 +156,7 @@ mod tests {
                 run: &run,
             };
             let mut gained = vec![Pose::IDENTITY; all.len()];
-            together.motion(&interval, &mut gained);
+            product_batch.motion(&interval, &mut gained);
             for ((alone, gained), sparse) in each.iter_mut().zip(gained).zip(&all) {
                 let mut own = [Pose::IDENTITY];
                 alone.motion(&interval, &mut own);
@@ -169,7 +169,7 @@ mod tests {
     fn what_is_seen_and_what_goes_with_rows_stands_alone() {
         let seen = Sparse { channel: Channel::OffsetAlong, covariates: vec![Speed] };
         for other in [seen, Sparse::of_rows()] {
-            assert!(!other.shares_moments() && Sparse::together(&[other]).is_none());
+            assert!(!other.shares_samples() && Sparse::batched(&[other]).is_none());
         }
     }
 }
