@@ -113,7 +113,10 @@ impl TrueNoise {
 
     fn noise(self) -> Noise {
         let [xy, theta]: [f64; 2] = std::array::from_fn(|k| self.measurement_var[k] + self.rounding_var[k]);
-        Noise { variance: [self.wheel_var_per_m, MIN_VAR, xy, theta].map(|variance| variance.max(MIN_VAR)) }
+        Noise {
+            variance: [self.wheel_var_per_m, MIN_VAR, xy, theta].map(|variance| variance.max(MIN_VAR)),
+            timing_s2: 0.0,
+        }
     }
 }
 

@@ -68,7 +68,7 @@ impl SamplingPeriod {
         let gap_s = median(t_s.windows(2).map(|pair| pair[1] - pair[0]).collect())?;
         // The middle gap is exact where stamps are.
         let Numbered { period_s, numbers, .. } = match Numbered::by(t_s, gap_s) {
-            Some(exact) if exact.cost == 0.0 => exact,
+            Some(exact) if exact.cost == f64::NEG_INFINITY => exact,
             of_gap => {
                 let others = first_periods(t_s)?.into_iter().filter_map(|first_s| Numbered::by(t_s, first_s));
                 let found = of_gap.into_iter().chain(others).min_by(|a, b| a.cost.total_cmp(&b.cost))?;
@@ -135,7 +135,7 @@ impl Numbered {
         if first_s <= 0.0 {
             return None;
         }
-        let whole = whole_gaps(t_s, first_s).map(|numbers| (numbers, 0.0));
+        let whole = whole_gaps(t_s, first_s).map(|numbers| (numbers, f64::NEG_INFINITY));
         let (numbers, cost) = whole.unwrap_or_else(|| likeliest_numbers(t_s, first_s));
         Some(Self { period_s: period(t_s, &numbers)?, numbers, cost })
     }
@@ -208,7 +208,8 @@ fn jitter(t_s: &[f64], period_s: f64) -> f64 {
     of_second.max(if bunched { of_gaps } else { 0.0 }).max(MIN_JITTER)
 }
 
-/// The numbers by the likeliest path, and its cost.
+/// The numbers by the likeliest path, and its cost: that of one beat over another one's counts the densities
+/// of lateness in seconds, or the beat by which stamps jitter most were always the likeliest.
 fn likeliest_numbers(t_s: &[f64], period_s: f64) -> (Vec<i64>, f64) {
     let at = |row: usize| (t_s[row] - t_s[0]) / period_s;
     let jitter = jitter(t_s, period_s);
@@ -249,7 +250,7 @@ fn likeliest_numbers(t_s: &[f64], period_s: f64) -> (Vec<i64>, f64) {
         let path = rows[row][at];
         (numbers[row], at) = (path.number, usize::from(path.from));
     }
-    (numbers, cost)
+    (numbers, cost + t_s.len() as f64 * (jitter * period_s).ln())
 }
 
 /// How late each stamp is against the line through the rows around it.

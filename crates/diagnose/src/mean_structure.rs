@@ -9,7 +9,7 @@ use dataset::Dataset;
 use estimation::{FitSettings, ModelFit};
 
 use crate::augmented_model::AugmentedModel;
-use crate::candidate::Candidate;
+use crate::candidate::{Candidate, terms};
 use crate::check::{Check, TestResult};
 use crate::finding;
 use crate::fit_cache::FitCache;
@@ -88,7 +88,7 @@ pub(crate) fn mean_structure<'a>(
     catalogue: &[Candidate],
     restored: bool,
 ) -> MeanStructure<'a> {
-    let model = MeanModel::of_effects(search(&base, catalogue, SCAN_LEVEL, FitCache::default()));
+    let (base, model) = search_beside_timing_noise(base, catalogue);
     // A large effect in few measurements looks like outliers: what a search among all measurements finds.
     let ungated = if model.has_outliers() { search_ungated(&base, &model.found, catalogue) } else { None };
     let model = ungated.map_or(model, MeanModel::of_effects);
@@ -106,6 +106,29 @@ pub(crate) fn mean_structure<'a>(
     let model = terms_if_dependent(&base, model);
     let MeanModel { found, unlisted, checked, competing } = model;
     MeanStructure { base, found, checked, unlisted, correlated, spurious, competing }
+}
+
+/// The effects beside a base fit. Where instants are noisy beside them, the base fit with that noise, and the
+/// effects beside it: motion that stamps do not tell resembles effects that grow with speed.
+fn search_beside_timing_noise<'a>(base: ModelFit<'a>, catalogue: &[Candidate]) -> (ModelFit<'a>, MeanModel<'a>) {
+    let found = search(&base, catalogue, SCAN_LEVEL, FitCache::default());
+    match noisy_base(&base, &found.model) {
+        None => (base, MeanModel::of_effects(found)),
+        Some(noisy) => {
+            let found = search(&noisy, catalogue, SCAN_LEVEL, FitCache::default());
+            (noisy, MeanModel::of_effects(found))
+        }
+    }
+}
+
+/// The base fit with the noise of instants that is left beside a model's effects; `None` where none is.
+fn noisy_base<'a>(base: &ModelFit<'a>, model: &AugmentedModel<'a>) -> Option<ModelFit<'a>> {
+    if !model.fit.has_timing_noise() {
+        return None;
+    }
+    let mut noisy = model.fit.clone();
+    noisy.fit_timing_noise(&mut terms(&model.candidates)).ok()?;
+    base.with_timing_noise_of(&noisy).ok()
 }
 
 /// Compares the effects with one sparse term. Where that explains more than all effects together, sparse
@@ -170,8 +193,8 @@ fn thin_if_autocorrelated<'a>(
         return Decorrelated { base, model, correlated: None, spurious };
     };
     let correlated = Some(model.checked.correlation);
-    let model = MeanModel::of_effects(search(&thinned, catalogue, SCAN_LEVEL, FitCache::default()));
-    Decorrelated { base: thinned, model, correlated, spurious }
+    let (base, model) = search_beside_timing_noise(thinned, catalogue);
+    Decorrelated { base, model, correlated, spurious }
 }
 
 /// Where residuals depend on something recorded: a search at a higher level of false positives, if it finds

@@ -2,8 +2,8 @@
 //! noise.
 //!
 //! Scalar updates, one component of a measurement after the other: along and across the robot, then heading.
-//! With gain k = P h/s the sensitivities follow D⁺ = D + k·∂v/∂p, exactly, because the gains do not depend on
-//! the mean parameters; those of P by ln(variance) follow the same recursion, differentiated.
+//! With gain k = P h/s the sensitivities follow D⁺ = D + k·∂v/∂p, exactly: gains do not depend on the mean
+//! parameters. Those of P by ln(variance) follow the same recursion, differentiated.
 
 use kinematics::{Kernel, Pose, Twist, Wheels, sin_cos, wrap_to_pi};
 use model_term::ModelTerm;
@@ -16,7 +16,7 @@ use crate::kinematic_samples::KinematicSample;
 use crate::model::{Column, Instrument, Model};
 use crate::noise::{NOISES, Noise, NoiseComponent};
 use crate::noise_score::{JointUpdate, NoiseScore};
-use crate::noise_shape::Whitened;
+use crate::noise_shape::{CorrelatedErrors, Whitened};
 use crate::pass_options::{OutlierGate, PassOptions};
 use crate::products::{Products, Sums};
 use crate::propagation::{CarriedState, Moved, PropagationSource, Propagator, SegmentCache};
@@ -24,6 +24,7 @@ use crate::rounding::Rounding;
 use crate::segment::{MeasuredPose, Segment, Start};
 use crate::settings::{OUTLIER_CHI_SQUARE, RESTART_AFTER_OUTLIERS};
 use crate::thinning::PropagationInterval;
+use crate::timing_noise::TimingScore;
 
 /// One whitened component of a measurement's innovation.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -64,13 +65,13 @@ pub(super) struct Filter<'f, 'a> {
     pub(super) samples: Vec<KinematicSample>,
     pub(super) outliers: Vec<usize>,
     pub(super) noise_score: NoiseScore,
+    pub(super) timing: TimingScore,
     /// Derivatives of a component of the measurement by each column: directly, and in all.
     direct: Vec<f64>,
     j: Vec<f64>,
 }
 
-/// Filters a segment's measurements at the ends of some propagation intervals, from a start heading that is
-/// not measured.
+/// Filters a segment's measurements at the ends of some propagation intervals, from a free start heading.
 pub(super) struct FilterRun<'r, 'f, 'a> {
     pub(super) filter: &'r mut Filter<'f, 'a>,
     pub(super) propagations: &'r [PropagationInterval],
@@ -161,6 +162,7 @@ impl<'f, 'a> Filter<'f, 'a> {
             samples: Vec::new(),
             outliers: Vec::new(),
             noise_score: NoiseScore::zero(),
+            timing: TimingScore::default(),
             direct: vec![0.0; all],
             j: vec![0.0; all],
         }
@@ -195,8 +197,7 @@ impl<'f, 'a> Filter<'f, 'a> {
         [xy, theta]
     }
 
-    /// Variances of a measurement's position and heading: the instrument's, times what its row states of
-    /// itself.
+    /// Variances of a measurement's position and heading: the instrument's, times its row's factors.
     #[inline(always)]
     fn variance_of(&self, measured: &MeasuredPose) -> [f64; 2] {
         let [xy, theta] = self.instrument_variance();
@@ -214,7 +215,7 @@ impl<'f, 'a> Filter<'f, 'a> {
         if let Some(shape) = &measured.shape {
             let lever = if free { Vector3::zeros() } else { self.lever(&measured) };
             let [whole, position, heading] = shape.at_start(self.instrument_variance(), lever);
-            self.covariance = Covariance::of([&whole]);
+            self.covariance = Covariance::of([&(whole + self.of_start_instant())]);
             self.covariance_by = Covariances::of([&Matrix3::zeros(), &Matrix3::zeros(), &position, &heading]);
         }
         if free {
@@ -223,6 +224,13 @@ impl<'f, 'a> Filter<'f, 'a> {
             let last = self.j.len() - 1;
             self.by.set(last, self.lever(&measured));
         }
+    }
+
+    /// Covariance of the pose by the error of the instant that it starts at.
+    #[inline(always)]
+    fn of_start_instant(&self) -> Matrix3<f64> {
+        let velocity = self.by.get(Column::Latency.index());
+        velocity * velocity.transpose() * self.noise.timing_s2
     }
 
     /// How the pose moves as the heading of the measurement that it starts at turns.
@@ -274,7 +282,7 @@ impl<'f, 'a> Filter<'f, 'a> {
         let lever = Vector3::new(-(self.pose.y_m - measured.y_m), self.pose.x_m - measured.x_m, 1.0);
         let position = Matrix3::from_diagonal(&Vector3::new(var_xy, var_xy, 0.0));
         let heading = lever * lever.transpose() * var_theta;
-        self.covariance = Covariance::of([&(position + heading)]);
+        self.covariance = Covariance::of([&(position + heading + self.of_start_instant())]);
         self.covariance_by = Covariances::of([&Matrix3::zeros(), &Matrix3::zeros(), &position, &heading]);
         self.pose_by_noise = [[0.0; NOISES]; 3];
         let interpolated_rad2 =
@@ -356,7 +364,7 @@ impl<'f, 'a> Filter<'f, 'a> {
             self.instrument;
         let (sin, cos) = sin_cos(self.pose.theta_rad);
         let mounted = Vector3::new(cos * lx - sin * ly, sin * lx + cos * ly, 0.0);
-        // A measurement is late by the distance that the instrument moved in the meantime.
+        // A late measurement is off by how far the instrument moved meanwhile.
         let twists = self.twists_before(propagation.intervals.end, measured.t_s, twist);
         let [moved, by_latency] = twists.map(|Twist { v_m_s, omega_rad_s }| {
             Vector3::new(cos * v_m_s - omega_rad_s * mounted.y, sin * v_m_s + omega_rad_s * mounted.x, omega_rad_s)
@@ -376,13 +384,15 @@ impl<'f, 'a> Filter<'f, 'a> {
         let axes = [Vector3::new(cos, sin, 0.0), Vector3::new(-sin, cos, 0.0), Vector3::z()];
         let components = if measured.theta_rad.is_some() { 3 } else { 2 };
         let [xy, theta] = variance;
-        let shape = measured.shape;
-        let Whitened { axes, variance: r } = match shape {
-            Some(shape) => shape.whitened(axes, self.instrument_variance()),
+        let by_instant = self.noise.timing_s2.sqrt() * by_latency;
+        let correlated = CorrelatedErrors::of(measured.shape, measured.variance_factor, by_instant);
+        let Whitened { axes, variance: r } = match correlated {
+            Some(errors) => errors.whitened(axes, self.instrument_variance()),
             None => Whitened { axes, variance: [xy, xy, theta] },
         };
         let rows = axes.map(|axis| Vector3::new(axis.x, axis.y, axis.dot(&by_heading)));
         let (mut covariance, mut correction, mut distance) = (self.covariance, Vector3::zeros(), 0.0);
+        let (mut turned, mut error_by, mut velocity_by) = (Vector3::zeros(), 0.0, 0.0);
         let measured = [0, 1, 2].map(|component| {
             if component >= components {
                 return Update { row: Vector3::zeros(), gain: Vector3::zeros(), v: 0.0, s: 1.0 };
@@ -394,26 +404,31 @@ impl<'f, 'a> Filter<'f, 'a> {
             let gain = ph * (1.0 / s);
             distance += v * v / s;
             correction += gain * v;
+            let velocity = axes[component].dot(&by_latency) - row.dot(&turned);
+            turned += gain * velocity;
+            error_by += velocity * v / s;
+            velocity_by += velocity * velocity / s;
             covariance.lower(&gain, &ph);
             Update { row, gain, v, s }
         });
         if self.pass_options.gate == OutlierGate::On && distance > OUTLIER_CHI_SQUARE {
             return false;
         }
-        if let Some(shape) = shape.filter(|_| self.pass_options.noise_score) {
+        self.timing.add(&TimingScore::of(error_by, velocity_by), 1.0);
+        if let Some(errors) = correlated.filter(|_| self.pass_options.noise_score) {
             let (variance, covariance) = (self.instrument_variance(), self.covariance.matrix(0));
             let has_heading = components == 3;
-            let joint = JointUpdate { shape, variance, covariance, by_heading, innovation: error, has_heading };
+            let joint = JointUpdate { errors, variance, covariance, by_heading, innovation: error, has_heading };
             self.noise_score.add_joint(&joint, &mut self.covariance_by, &mut self.pose_by_noise);
         }
         self.covariance = covariance;
         self.samples.extend(sample);
-        // The geometry, and a free heading, which is the last column, act through the pose alone.
+        // The geometry, and a free heading in the last column, act through the pose alone.
         let mounted_by = [Vector3::new(cos, sin, 0.0), Vector3::new(-sin, cos, 0.0), Vector3::z(), -by_latency];
         for (component, update) in measured.iter().enumerate().take(components) {
             let axis = axes[component];
             let Update { row, gain, v, s } = *update;
-            if self.pass_options.noise_score && shape.is_none() {
+            if self.pass_options.noise_score && correlated.is_none() {
                 self.score_noise(component, update, r[component]);
             }
             for (direct, by) in self.direct[Column::SensorX.index()..].iter_mut().zip(&mounted_by) {

@@ -53,6 +53,7 @@ mod settings;
 #[cfg(test)]
 mod tests;
 mod thinning;
+mod timing_noise;
 mod wheel_angles;
 mod wheel_rates;
 

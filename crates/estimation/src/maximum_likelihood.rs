@@ -61,6 +61,9 @@ impl FitSettings {
         if self.nuisances && !is_explained {
             add_nuisances(&mut found, OutlierGate::On)?;
         }
+        if self.nuisances {
+            found.fit_timing_noise(&mut [])?;
+        }
         found.fix_unobservable()?;
         Ok(found)
     }

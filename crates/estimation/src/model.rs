@@ -162,8 +162,8 @@ impl Model {
     }
 
     /// How far the centre goes across the middle heading of an interval because its wheels do not turn
-    /// evenly, metres ([`WheelInterval::chord_area_rad2`]). A row of 0.1 s in which a robot at 0.3 m/s begins to
-    /// turn by 2.5 rad/s² goes 0.06 mm aside, each such row the same way.
+    /// evenly, metres ([`WheelInterval::chord_area_rad2`]). A row of 0.1 s in which a robot at 0.3 m/s begins
+    /// to turn by 2.5 rad/s² goes 0.06 mm aside, each such row the same way.
     #[inline(always)]
     pub(crate) fn across_m(&self, interval: &WheelInterval) -> f64 {
         self.m_per_rad.left * self.m_per_rad.right / self.separation_m * interval.chord_area_rad2

@@ -1,4 +1,5 @@
-//! Noise of the wheels and of the instrument: four variances and their priors.
+//! Noise of the wheels and of the instrument: four variances and their priors, and the noise of the instants of
+//! measurements.
 
 use dataset::TruthNoise;
 
@@ -28,11 +29,14 @@ impl NoiseComponent {
 /// How many variances there are.
 pub(crate) const NOISES: usize = NoiseComponent::ALL.len();
 
-/// Values of the four variances; [`NoiseComponent`] says what each is of, and its unit.
+/// Values of the variances.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
-    /// The variances in the order of [`NoiseComponent::ALL`].
+    /// The variances in the order of [`NoiseComponent::ALL`], which says what each is of, and its unit.
     pub variance: [f64; 4],
+    /// Of the instants of measurements on the log's clock, s²: stamps that jitter, and motion that rows do not
+    /// tell. A robot that stands shows none of it.
+    pub timing_s2: f64,
 }
 
 /// Prior of the standard deviations: ln σ is normal about ln `centre` with the standard deviation `log_sd`.
@@ -40,6 +44,8 @@ pub struct Noise {
 pub(crate) struct NoisePrior {
     pub(crate) centre: [f64; 4],
     pub(crate) log_sd: [f64; 4],
+    /// As in [`Noise`]; it is fitted outside the optimizer, and has no prior.
+    pub(crate) timing_s2: f64,
 }
 
 impl NoisePrior {
@@ -56,6 +62,7 @@ impl NoisePrior {
                 theta.unwrap_or(HEADING_PRIOR_SIGMA_RAD),
             ],
             log_sd: [NOISE_PRIOR_LOG_SIGMA, NOISE_PRIOR_LOG_SIGMA, log_sd(xy), log_sd(theta)],
+            timing_s2: 0.0,
         }
     }
 
@@ -74,7 +81,7 @@ impl NoisePrior {
     }
 
     pub(crate) fn noise(&self) -> Noise {
-        Noise { variance: self.centre.map(|sigma| sigma * sigma) }
+        Noise { variance: self.centre.map(|sigma| sigma * sigma), timing_s2: self.timing_s2 }
     }
 
     /// Gradient and curvature of −log prior by the logarithm of each variance.
@@ -94,8 +101,8 @@ impl Noise {
         self.variance[component as usize].sqrt()
     }
 
-    /// All times a factor, and none below `least`.
+    /// All but that of instants times a factor, and none below `least`.
     pub(crate) fn scaled(&self, factor: f64, least: f64) -> Self {
-        Self { variance: self.variance.map(|variance| (variance * factor).max(least)) }
+        Self { variance: self.variance.map(|variance| (variance * factor).max(least)), ..*self }
     }
 }

@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
 use crate::covariances::Covariances;
 use crate::noise::{NOISES, NoiseComponent};
-use crate::noise_shape::NoiseShape;
+use crate::noise_shape::CorrelatedErrors;
 
 /// Score of the cost by the logarithms of the variances, and its information.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,7 +19,7 @@ pub(crate) struct NoiseScore {
 
 /// What the filter knows of a whole measurement before it takes it.
 pub(crate) struct JointUpdate {
-    pub(crate) shape: NoiseShape,
+    pub(crate) errors: CorrelatedErrors,
     /// Variances of position and heading.
     pub(crate) variance: [f64; 2],
     /// Covariance of the pose.
@@ -51,10 +51,10 @@ impl NoiseScore {
         covariance_by: &mut Covariances<NOISES>,
         pose_by_noise: &mut [[f64; NOISES]; 3],
     ) {
-        let JointUpdate { shape, variance, covariance, by_heading, mut innovation, has_heading } = *joint;
+        let JointUpdate { errors, variance, covariance, by_heading, mut innovation, has_heading } = *joint;
         let mut h = Matrix3::identity();
         h.set_column(2, &by_heading);
-        let (mut noise, mut noise_by) = (shape.covariance(variance), shape.covariance_by(variance));
+        let (mut noise, mut noise_by) = (errors.covariance(variance), errors.covariance_by(variance));
         if !has_heading {
             // A component of its own that says nothing.
             h.row_mut(2).fill(0.0);

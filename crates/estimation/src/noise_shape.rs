@@ -28,6 +28,11 @@ pub(crate) struct Whitened {
 }
 
 impl NoiseShape {
+    /// Of independent components, by factors of the variances of position and heading.
+    pub(crate) const fn independent([xy, theta]: [f64; 2]) -> Self {
+        Self { elements: [xy, 0.0, 0.0, xy, 0.0, theta] }
+    }
+
     /// Of a stated covariance, relative to standard deviations of position, metres, and heading, radians. A
     /// part that it does not state has the variance factor in `otherwise`.
     pub(crate) fn of(stated: &PoseCovariance, reference: [f64; 2], otherwise: [f64; 2]) -> Self {
@@ -80,6 +85,42 @@ impl NoiseShape {
         [self.covariance(variance), position, heading].map(|noise| by_error * noise * by_error.transpose())
     }
 
+    /// Errors of a measurement in the room, from three independent numbers of variance 1.
+    pub(crate) fn errors(&self, variance: [f64; 2], draws: Vector3<f64>) -> Vector3<f64> {
+        self.covariance(variance).cholesky().map_or_else(Vector3::zeros, |root| root.l() * draws)
+    }
+}
+
+/// Errors of a measurement whose components correlate: by what its row states, or because its instant is
+/// known with an error, which moves it along the path.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct CorrelatedErrors {
+    shape: NoiseShape,
+    /// One standard deviation of the instant times the velocity of the instrument in the room: metres, radians.
+    by_instant: Vector3<f64>,
+}
+
+impl CorrelatedErrors {
+    /// Of a measurement with a stated covariance, or with factors of both variances; `None` where its
+    /// components are independent.
+    pub(crate) fn of(stated: Option<NoiseShape>, factors: [f64; 2], by_instant: Vector3<f64>) -> Option<Self> {
+        let shape = match stated {
+            None if by_instant == Vector3::zeros() => return None,
+            of_row => of_row.unwrap_or_else(|| NoiseShape::independent(factors)),
+        };
+        Some(Self { shape, by_instant })
+    }
+
+    /// R in the room for variances of position and heading.
+    pub(crate) fn covariance(&self, variance: [f64; 2]) -> Matrix3<f64> {
+        self.shape.covariance(variance) + self.by_instant * self.by_instant.transpose()
+    }
+
+    /// ∂R/∂ln of both variances.
+    pub(crate) fn covariance_by(&self, variance: [f64; 2]) -> [Matrix3<f64>; 2] {
+        self.shape.covariance_by(variance)
+    }
+
     /// The components of a measurement by a robot that heads along the first of `axes`.
     pub(crate) fn whitened(&self, axes: [Vector3<f64>; 3], variance: [f64; 2]) -> Whitened {
         let r = self.covariance(variance);
@@ -90,10 +131,5 @@ impl NoiseShape {
         let d_across = of(&across, &across);
         heading -= along * (of(&heading, &along) / d_along) + across * (of(&heading, &across) / d_across);
         Whitened { variance: [d_along, d_across, of(&heading, &heading)], axes: [along, across, heading] }
-    }
-
-    /// Errors of a measurement in the room, from three independent numbers of variance 1.
-    pub(crate) fn errors(&self, variance: [f64; 2], draws: Vector3<f64>) -> Vector3<f64> {
-        self.covariance(variance).cholesky().map_or_else(Vector3::zeros, |root| root.l() * draws)
     }
 }

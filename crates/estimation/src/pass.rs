@@ -21,6 +21,7 @@ use crate::records::Records;
 use crate::segment::{Segment, Start};
 use crate::settings::MIN_PARALLEL_WORK;
 use crate::thinning::{PropagationInterval, Selection};
+use crate::timing_noise::TimingScore;
 
 /// The result of a pass.
 #[derive(Debug, Clone)]
@@ -36,6 +37,8 @@ pub struct Pass {
     pub outliers: Vec<(usize, usize)>,
     /// Score of the cost by the logarithms of the variances.
     pub(crate) noise: NoiseScore,
+    /// Score by the variance of the instants of measurements.
+    pub(crate) timing: TimingScore,
     /// Response of the free start headings to a step of the parameters.
     pub(crate) headings: Vec<FreeHeading>,
     /// Response of the groups' own instruments to one.
@@ -64,6 +67,7 @@ impl Pass {
             samples: Vec::new(),
             outliers: Vec::new(),
             noise: NoiseScore::zero(),
+            timing: TimingScore::default(),
             headings: Vec::new(),
             own: Vec::new(),
             cached: None,
@@ -110,9 +114,10 @@ pub(crate) fn pass(
         InstructionSet::Avx2.run(FilterRun { filter: &mut filter, propagations, free_heading_rad });
         *carried = Some(filter.carried());
         let samples = std::mem::take(&mut filter.samples);
+        let timing = filter.timing;
         let (sums, outliers, innovations, noise_score, cached) = filter.into_parts();
         let (equations, heading) = sums.eliminated(segment.run, columns);
-        (equations, OfSegment { number, heading, innovations, samples, outliers, noise_score, cached })
+        (equations, OfSegment { number, heading, innovations, samples, outliers, noise_score, timing, cached })
     };
     let mut phases = Vec::with_capacity(selections.len());
     for (phase, selection) in selections.iter().enumerate() {
@@ -179,6 +184,7 @@ pub(crate) fn pass(
                 result.headings.push(FreeHeading { segment: of.number, run, rest, by });
             }
             result.noise.add(&of.noise_score, weight);
+            result.timing.add(&of.timing, weight);
         }
         phases.push(cached);
         if pass_options.innovations {
@@ -247,5 +253,6 @@ struct OfSegment {
     samples: Vec<KinematicSample>,
     outliers: Vec<usize>,
     noise_score: NoiseScore,
+    timing: TimingScore,
     cached: Option<SegmentCache>,
 }

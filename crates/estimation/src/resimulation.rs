@@ -111,7 +111,8 @@ impl ModelFit<'_> {
         for measurement in &mut segment.measurements {
             pose = propagator.dead_reckon(pose, at..measurement.after);
             at = measurement.after;
-            let off = propagator.measurement_offset(pose, measurement.t_s, at, latency_s);
+            let late_s = if noise.timing_s2 > 0.0 { noise.timing_s2.sqrt() * draws.normal() } else { 0.0 };
+            let off = propagator.measurement_offset(pose, measurement.t_s, at, latency_s + late_s);
             let seen = pose * off * body_from_sensor;
             let errors = draws.errors(measurement, [position_m2, heading_rad2]);
             measurement.x_m = seen.x_m + errors.x;

@@ -402,5 +402,5 @@ fn noise(scenario: &Scenario) -> Option<Noise> {
         | Instrument::Revisit { .. } => None,
     })?;
     let sigmas = [scenario.noise.wheel_sigma_m_per_sqrt_m, MIN_NOISE_SIGMA, xy_m, theta_rad];
-    Some(Noise { variance: sigmas.map(|sigma| sigma.max(MIN_NOISE_SIGMA).powi(2)) })
+    Some(Noise { variance: sigmas.map(|sigma| sigma.max(MIN_NOISE_SIGMA).powi(2)), timing_s2: 0.0 })
 }

@@ -158,7 +158,7 @@ impl PlannedRun {
         let mut named = model.clone();
         named.term_values.resize(parameters, 0.0);
         columns.iter().zip(step.iter()).for_each(|(column, by)| named.advance(column_at(*column), *by));
-        let noise = estimation::Noise { variance: [1.0; 4] };
+        let noise = estimation::Noise { variance: [1.0; 4], timing_s2: 0.0 };
         // Only the records matter here: dead reckoning takes the model that it is given.
         let fit = ModelFit::from_parameters(self.reference.clone(), noise, &[self.dataset.session()]);
         let measurements = |model: &Model| -> Option<Vec<Vector3<f64>>> {

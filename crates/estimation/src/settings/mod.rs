@@ -185,6 +185,17 @@ pub(crate) const REVERSAL_M: f64 = 1e-3;
 /// Derived: χ² with three degrees of freedom at 1 − 1e-5.
 pub(crate) const OUTLIER_CHI_SQUARE: f64 = 25.9;
 
+/// Score of the noise of instants, in standard deviations, above which it is fitted.
+/// Budgeted: one sound log in 30,000.
+pub(crate) const MIN_TIMING_NOISE_SIGMAS: f64 = 4.0;
+
+/// Steps of that noise at the most, and its change, as a share of it, below which it has converged.
+/// Budgeted: a twentieth of a variance, a fortieth of a standard deviation, decides nothing.
+pub(crate) const MAX_TIMING_NOISE_STEPS: usize = 5;
+/// As said above.
+/// Budgeted: as said above.
+pub(crate) const TIMING_NOISE_TOLERANCE: f64 = 0.05;
+
 /// Outliers in a row after which the filter restarts at the measurement: then the filter is wrong.
 /// Tuned: by hand; no record of what on.
 pub(crate) const RESTART_AFTER_OUTLIERS: u32 = 2;

@@ -114,7 +114,7 @@ fn a_long_ellipse_pulls_along_its_short_axis_alone() {
         dataset.truth_noise =
             TruthNoise { sigma_xy_m: Some(SHORT_M), sigma_theta_rad: Some(1e-3), ..TruthNoise::default() };
         let model = Model { m_per_rad: Wheels::both(0.08), body_from_sensor: Pose::IDENTITY, latency_s: 0.0, ..MODEL };
-        let noise = Noise { variance: [1e-16, 1e-16, SHORT_M * SHORT_M, 1e-6] };
+        let noise = Noise { variance: [1e-16, 1e-16, SHORT_M * SHORT_M, 1e-6], timing_s2: 0.0 };
         let records = Records::of(&[dataset.session()]);
         let selections = Selection::of(&records, Thinning::NONE, &model);
         let options = PassOptions { gate: OutlierGate::Off, ..PassOptions::default() };

@@ -15,6 +15,7 @@ mod partial;
 mod path_shape;
 mod rounding;
 mod selection;
+mod timing;
 
 const LEFT_RAD: [f64; 12] = [2.0, 2.0, -1.0, 0.0, 3.0, 1.5, 2.0, -2.0, -3.0, 1.0, 2.0, 2.5];
 const RIGHT_RAD: [f64; 12] = [2.0, 2.5, 1.0, 0.0, 2.0, 1.5, -2.0, 2.0, -3.0, 2.0, 1.0, 2.5];
@@ -187,7 +188,7 @@ fn model() -> Model {
     Model { term_values: vec![0.004, -0.003], ..MODEL }
 }
 
-const NOISE: Noise = Noise { variance: [1e-6, 4e-6, 9e-6, 2.5e-5] };
+const NOISE: Noise = Noise { variance: [1e-6, 4e-6, 9e-6, 2.5e-5], timing_s2: 0.0 };
 
 fn run(dataset: &Dataset, model: &Model, noise: &Noise, headings: &[f64], pass_options: PassOptions) -> Pass {
     let model = &Model {

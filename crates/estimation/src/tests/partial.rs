@@ -128,7 +128,7 @@ fn nominal() -> Model {
 }
 
 fn noise() -> Noise {
-    Noise { variance: [1e-6, 4e-6, SIGMA_M * SIGMA_M, SIGMA_RAD * SIGMA_RAD] }
+    Noise { variance: [1e-6, 4e-6, SIGMA_M * SIGMA_M, SIGMA_RAD * SIGMA_RAD], timing_s2: 0.0 }
 }
 
 #[test]

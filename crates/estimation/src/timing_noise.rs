@@ -1,0 +1,95 @@
+//! Noise of the instants of measurements: what stamps that jitter, and motion that rows do not tell, do to a
+//! moving robot.
+//!
+//! An instant that is off by ε moves a measurement along the path: by ε times the velocity u of the
+//! instrument, turn rate included. R = σ²-terms + σ_t² u uᵀ grows with speed, where noise of poses does not.
+//! The variance is fitted outside the optimizer, by its own score, where that is significant: near zero its
+//! logarithm has no information.
+//! Reference: Rao 1948 (score test); Bar-Shalom, Li & Kirubarajan 2001, chapter 5 (innovations).
+
+use model_term::ModelTerm;
+
+use crate::error::EstimationError;
+use crate::model_fit::ModelFit;
+use crate::noise::Noise;
+use crate::settings::{MAX_TIMING_NOISE_STEPS, MIN_TIMING_NOISE_SIGMAS, TIMING_NOISE_TOLERANCE};
+
+/// Score of the log-likelihood by the variance of the instants of measurements, and its information: of each
+/// measurement with the innovation e, its covariance S and the instrument's velocity u, ½((uᵀS⁻¹e)² − uᵀS⁻¹u)
+/// and ½(uᵀS⁻¹u)².
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct TimingScore {
+    gradient: f64,
+    information: f64,
+}
+
+impl TimingScore {
+    /// Of a measurement, by uᵀS⁻¹e and uᵀS⁻¹u.
+    pub(crate) fn of(error: f64, velocity: f64) -> Self {
+        Self { gradient: 0.5 * (error * error - velocity), information: 0.5 * velocity * velocity }
+    }
+
+    pub(crate) fn add(&mut self, other: &Self, weight: f64) {
+        self.gradient += weight * other.gradient;
+        self.information += weight * other.information;
+    }
+
+    /// In standard deviations: standard normal where the variance is right.
+    pub(crate) fn z(&self) -> f64 {
+        if self.information > 0.0 { self.gradient / self.information.sqrt() } else { 0.0 }
+    }
+
+    /// By how much the variance is too small, s², by one step of scoring.
+    pub(crate) fn step_s2(&self) -> f64 {
+        if self.information > 0.0 { self.gradient / self.information } else { 0.0 }
+    }
+}
+
+impl ModelFit<'_> {
+    /// Whether the noise of instants is larger than it is in the fit, beyond chance.
+    #[must_use]
+    pub fn has_timing_noise(&self) -> bool {
+        self.solution.pass.timing.z() > MIN_TIMING_NOISE_SIGMAS
+    }
+
+    /// Fits the noise of instants where it is significant, with the values that were found. `terms` are those
+    /// of the fit.
+    ///
+    /// # Errors
+    /// [`EstimationError`] when it diverges.
+    pub fn fit_timing_noise(&mut self, terms: &mut [Box<dyn ModelTerm>]) -> Result<(), EstimationError> {
+        if !self.has_timing_noise() {
+            return Ok(());
+        }
+        for _ in 0..MAX_TIMING_NOISE_STEPS {
+            let before_s2 = self.prior.timing_s2;
+            let next_s2 = (before_s2 + self.solution.pass.timing.step_s2()).max(0.0);
+            self.refit_at_timing_noise(next_s2, terms)?;
+            if (next_s2 - before_s2).abs() <= TIMING_NOISE_TOLERANCE * next_s2 {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// The fit with the noise of instants that another one has, on the same records.
+    ///
+    /// # Errors
+    /// [`EstimationError`] when it diverges.
+    pub fn with_timing_noise_of(&self, other: &Self) -> Result<Self, EstimationError> {
+        let mut noisy = self.clone();
+        noisy.refit_at_timing_noise(other.prior.timing_s2, &mut [])?;
+        Ok(noisy)
+    }
+
+    fn refit_at_timing_noise(
+        &mut self,
+        timing_s2: f64,
+        terms: &mut [Box<dyn ModelTerm>],
+    ) -> Result<(), EstimationError> {
+        self.prior.timing_s2 = timing_s2;
+        let mut from = self.current_values();
+        from.noise = from.noise.map(|noise| Noise { timing_s2, ..noise });
+        self.refit(Some(from), terms)
+    }
+}
