@@ -81,7 +81,7 @@ function pages() {
     ambiguous: { ...drive, next: true },
     "hostile-page": { ...drive, hostile: true },
     calibrate: drive, evaluate: drive, compare: { plain: true }, plan: { still: true }, sweep: {}, reproduce: {},
-    fleet: { small: true },
+    fleet: { small: true, answers: ["Robots with an excess", "Changes", "Failed datasets"] },
   };
 }
 
