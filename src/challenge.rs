@@ -6,8 +6,8 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use blind_benchmark::{
-    CaseResult, ChallengeResult, DiagnosisBaseline, DiagnosisCheck, Measure, Scope, challenge_case,
-    challenge_datasets, challenge_outcomes,
+    CaseResult, ChallengeResult, DiagnosisBaseline, DiagnosisCheck, Measure, Scope, challenge_case, challenge_datasets,
+    challenge_outcomes,
 };
 use clap::Args;
 use dataset::Existing;

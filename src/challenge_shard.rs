@@ -90,7 +90,9 @@ pub(crate) fn merged(folders: &[PathBuf]) -> Result<(ChallengeCampaign, Vec<Case
         let complain = |why: String| Err(format!("{}: {why}", folder.display()).into());
         if part.campaign != campaign {
             let (theirs, ours) = (format!("{:?}", part.campaign), format!("{campaign:?}"));
-            return complain(format!("a part of {theirs}, where that in {first_folder}, by this program, is of {ours}"));
+            return complain(format!(
+                "a part of {theirs}, where that in {first_folder}, by this program, is of {ours}"
+            ));
         }
         if *number <= before {
             return complain(format!("part {number}/{of} is given twice"));

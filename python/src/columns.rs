@@ -7,8 +7,8 @@ use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use yair::dataset::{
-    self, Dataset, DatasetError, Existing, ExtraChannel, HeadingReading, NominalRobot, Odometry, PoseCovariance, Provenance, Run,
-    RunInfo, TruthNoise, TruthSample, TruthSigma, WheelLog,
+    self, Dataset, DatasetError, Existing, ExtraChannel, HeadingReading, NominalRobot, Odometry, PoseCovariance,
+    Provenance, Run, RunInfo, TruthNoise, TruthSample, TruthSigma, WheelLog,
 };
 use yair::kinematics::Wheels;
 
