@@ -38,8 +38,8 @@ pub(crate) struct Arguments {
     /// of yair sweep.
     #[arg(long, value_name = "I/N|auto", requires = "out", group = "writes")]
     shard: Option<ShardChoice>,
-    /// Put the parts of a campaign in these folders together, in any order; the result is that of one machine,
-    /// to the bit.
+    /// Put the parts of a campaign in these folders together, in any order; the result is that of one
+    /// machine, to the bit.
     #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["cases", "seed", "case", "large", "shard", "out", "jobs"])]
     merge: Vec<PathBuf>,
     /// Write the datasets of --case, one folder a session, or the part of --shard into this folder.

@@ -252,9 +252,9 @@ mod tests {
     fn shards_are_read_and_cover_everything_once() {
         for of in 1..12_u32 {
             let shards: Vec<Shard> = (1..=of).map(|number| Shard::new(number, of).expect("within")).collect();
-            assert_eq!(shards[0].first(1000), 0);
-            assert_eq!(shards.last().expect("one").end(1000), 1000);
-            assert!(shards.windows(2).all(|pair| pair[0].end(1000) == pair[1].first(1000)));
+            assert_eq!(shards[0].share(1000).start, 0);
+            assert_eq!(shards.last().expect("one").share(1000).end, 1000);
+            assert!(shards.windows(2).all(|pair| pair[0].share(1000).end == pair[1].share(1000).start));
         }
         assert_eq!("2/8".parse(), Ok(Shard { number: 2, of: 8 }));
         for wrong in ["0/8", "9/8", "2", "2/", "a/b", "1/0", "-1/3"] {
