@@ -109,6 +109,8 @@ def test_failures_of_workers_and_waits_have_an_end(nodes, scenarios, tmp_path):
     with pytest.raises(yair.Error, match=r"shard 1/1: .*nonsense\.toml"):
         (tmp_path / "nonsense.toml").write_text("x = 1\n")
         yair.cluster.sweep(tmp_path / "nonsense.toml", 1, tmp_path / "out", started.address)
+    with pytest.raises(yair.Error, match=r"no Ray cluster answers at 127\.0\.0\.1:1: "):
+        yair.cluster.sweep(scenarios / "paper.toml", 1, tmp_path / "out", "127.0.0.1:1")
     with pytest.raises(yair.Error, match="each takes 64 processors, and the largest node has 1"):
         yair.cluster.sweep(scenarios / "paper.toml", 1, tmp_path / "out", started.address, cpus=64, patience_s=1.0)
 

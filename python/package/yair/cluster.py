@@ -9,6 +9,7 @@ gives the same bytes. Ray is imported by the first call: `pip install yair[clust
 from __future__ import annotations
 
 import os
+import socket
 import tempfile
 import time
 import warnings
@@ -30,8 +31,8 @@ RETRIES = 3
 PATIENCE_S = 3600.0
 """Longest time in which no task ends, seconds: shards that one computes for longer are cut too coarsely."""
 
-CONNECT_S = 60
-"""Longest time for the answer of a cluster, seconds: Ray's own nodes take some ten to start."""
+CONNECT_S = 10.0
+"""Longest time until somebody at a cluster's address answers, seconds: that of a slow network, by far."""
 
 LOOK_S = 0.5
 """Time between two looks at what has ended, seconds; Ctrl-C is heard then."""
@@ -262,11 +263,11 @@ def _cluster(address: str | None, cpus: int, retries: int, patience_s: float) ->
     ray = _ray()
     began = not ray.is_initialized()
     if began:
-        with _connect_timeout():
-            try:
-                ray.init(address=address, log_to_driver=False, logging_level="ERROR")
-            except (ConnectionError, RuntimeError, ValueError, ray.exceptions.RayError) as error:
-                raise Error(f"no Ray cluster answers at {address or 'this machine'}: {_line(error)}") from None
+        _refuse_unreachable(address)
+        try:
+            ray.init(address=address, log_to_driver=False, logging_level="ERROR")
+        except (ConnectionError, RuntimeError, ValueError, ray.exceptions.RayError) as error:
+            raise Error(f"no Ray cluster answers at {address or 'this machine'}: {_line(error)}") from None
     elif address not in (None, "auto", ray.get_runtime_context().gcs_address):
         here = ray.get_runtime_context().gcs_address
         raise Error(f"this process is connected to the cluster {here}; call ray.shutdown() before {address} is used")
@@ -372,17 +373,16 @@ class _Farm:
         return f"{why}; cut the work into more shards, or give a larger patience_s"
 
 
-@contextmanager
-def _connect_timeout() -> Iterator[None]:
-    """Bounds how long Ray waits for a cluster's answer."""
-    name = "RAY_gcs_rpc_server_connect_timeout_s"
-    before = os.environ.get(name)
-    os.environ.setdefault(name, str(CONNECT_S))
+def _refuse_unreachable(address: str | None) -> None:
+    """Asks whether anybody listens there, since Ray itself would try for minutes."""
+    given = address or os.environ.get("RAY_ADDRESS", "")
+    host, _, port = given.rpartition(":")
+    if "/" in host or not host or not port.isdigit():
+        return
     try:
-        yield
-    finally:
-        if before is None:
-            os.environ.pop(name, None)
+        socket.create_connection((host.strip("[]"), int(port)), CONNECT_S).close()
+    except (OSError, OverflowError) as error:
+        raise Error(f"no Ray cluster answers at {given}: {error}; ray start --head prints the address") from None
 
 
 def _line(error: BaseException) -> str:
