@@ -112,8 +112,8 @@ impl Columns {
         Ok(())
     }
 
-    /// Gives the last run its truth; NaN = not seen. A row without x and y is a heading alone. `covariance` has
-    /// the six columns of elements in the format's order; NaN is 0 there.
+    /// Gives the last run its truth; NaN = not seen. A row without x and y is a heading alone. `covariance`
+    /// has the six columns of elements in the format's order; NaN is 0 there.
     #[pyo3(signature = (t_s, x_m, y_m, theta_rad=None, sigma_xy_m=None, sigma_theta_rad=None, covariance=None))]
     #[expect(clippy::too_many_arguments, reason = "columns, as truth.csv has them")]
     fn add_truth(

@@ -146,8 +146,8 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     }
 }
 
-/// Datasets in or below these folders, as `yair fleet` finds them, of which the folder of its `--out` keeps no
-/// result yet: what other machines may be given to compute. A dataset that cannot be read is among them.
+/// Datasets in or below these folders, as `yair fleet` finds them, of which the folder of its `--out` keeps
+/// no result yet: what other machines may be given to compute. A dataset that cannot be read is among them.
 ///
 /// # Errors
 /// A message that names the folder: it is not there, it has no dataset, or another process writes into `out`.
