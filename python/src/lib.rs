@@ -1,5 +1,6 @@
 //! `yair._yair`: the command and its datasets for Python. What a Python user meets is in `package/yair/`;
-//! here is what only Rust can do: running the command without the interpreter's lock, and columns from and to numpy.
+//! here is what only Rust can do: running the command without the interpreter's lock, and columns from and to
+//! numpy.
 
 mod columns;
 
