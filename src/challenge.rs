@@ -1,17 +1,20 @@
-//! `yair challenge [--cases N] [--seed S] [--case K [--out DIR]] [--check BASELINE [--update]]`
+//! `yair challenge [--cases N] [--seed S] [--case K [--out DIR]] [--shard I/N --out DIR] [--merge DIR...]
+//! [--check BASELINE [--update]]`
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
 use blind_benchmark::{
-    CaseResult, ChallengeResult, DiagnosisBaseline, DiagnosisCheck, Measure, Scope, challenge, challenge_case,
-    challenge_datasets,
+    CaseResult, ChallengeResult, DiagnosisBaseline, DiagnosisCheck, Measure, Scope, challenge_case, challenge_datasets,
+    challenge_outcomes,
 };
 use clap::Args;
 use dataset::Existing;
 use serde::Serialize;
 
+use crate::challenge_shard::{ChallengeCampaign, ChallengeShard, merged};
+use crate::shard::{ShardChoice, locked};
 use crate::terminal::{Failure, Terminal, cell, table};
 
 /// The blind benchmark of `diagnose`: random robots with hidden effects, nulls and effects that are left out
@@ -26,13 +29,21 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u64,
     /// Drive this case alone and show what was hidden and what was said.
-    #[arg(long, value_name = "K", conflicts_with = "cases")]
+    #[arg(long, value_name = "K", conflicts_with = "cases", group = "writes")]
     case: Option<u64>,
     /// Hide large effects alone: one of the mean in each case, at ten to a hundred of its detection limits.
     #[arg(long, conflicts_with = "check")]
     large: bool,
-    /// Write the datasets of --case into this folder, one folder a session.
-    #[arg(long, value_name = "DIR", requires = "case")]
+    /// Drive part I of N only and leave it in the folder of --out; --merge puts the parts together. auto: as
+    /// of yair sweep.
+    #[arg(long, value_name = "I/N|auto", requires = "out", group = "writes")]
+    shard: Option<ShardChoice>,
+    /// Put the parts of a campaign in these folders together, in any order; the result is that of one
+    /// machine, to the bit.
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["cases", "seed", "case", "large", "shard", "out", "jobs"])]
+    merge: Vec<PathBuf>,
+    /// Write the datasets of --case, one folder a session, or the part of --shard into this folder.
+    #[arg(long, value_name = "DIR", requires = "writes")]
     out: Option<PathBuf>,
     /// Compare with a stored campaign; exit 1 when any kind of failure got more frequent. Driven are
     /// nulls, and the single effects of every second block of twenty.
@@ -80,21 +91,52 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         Some(path) if !arguments.update => Some(DiagnosisBaseline::read(path)?),
         _ => None,
     };
+    if !arguments.merge.is_empty() {
+        let (campaign, outcomes) = merged(&arguments.merge)?;
+        if arguments.check.is_some() && campaign.scope != Scope::Guarded {
+            return Err("these parts are of a campaign without --check, which drives other cases".into());
+        }
+        let result = ChallengeResult::of(campaign.seed, outcomes);
+        return tell(arguments, campaign.seed, campaign.cases, &result, baseline.as_ref(), terminal);
+    }
     let cases = arguments.cases.unwrap_or(if arguments.check.is_some() { CHECKED_CASES } else { DEFAULT_CASES });
+    let shard = arguments.shard.map(|shard| shard.resolved(terminal)).transpose()?;
+    let numbers = shard.map_or(0..cases, |shard| shard.share(cases));
+    let _lock = arguments.out.as_deref().map(|out| locked(out, terminal)).transpose()?;
+    let count = numbers.end - numbers.start;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let jobs = if arguments.jobs == 0 { cores } else { arguments.jobs.into() };
-    let minutes = cases as f64 * SECONDS_A_CASE / (60.0 * jobs as f64);
-    terminal.remark(&format!("{cases} cases on {jobs} threads: about {:.0} minutes", minutes.max(1.0)));
-    let bar = terminal.progress(cases, "cases");
+    let minutes = count as f64 * SECONDS_A_CASE / (60.0 * jobs as f64);
+    terminal.remark(&format!("{count} cases on {jobs} threads: about {:.0} minutes", minutes.max(1.0)));
+    let bar = terminal.progress(count, "cases");
     let started = Instant::now();
     let scope = arguments.scope();
-    let result = challenge(arguments.seed, cases, scope, arguments.jobs.into(), &|| bar.inc(1))?;
+    let outcomes = challenge_outcomes(arguments.seed, numbers, scope, arguments.jobs.into(), &|| bar.inc(1))?;
     bar.finish_and_clear();
-    terminal.remark(&format!("{} cases in {:.1} s", result.cases.len(), started.elapsed().as_secs_f64()));
-    let now = DiagnosisBaseline::of(arguments.seed, cases, &result.cases);
+    terminal.remark(&format!("{} cases in {:.1} s", outcomes.len(), started.elapsed().as_secs_f64()));
+    if let Some(shard) = shard {
+        let out = arguments.out.as_deref().unwrap_or(Path::new("."));
+        ChallengeShard::new(ChallengeCampaign::new(arguments.seed, cases, scope), shard, outcomes).write(out)?;
+        terminal.remark(&format!("part {shard} stands in {}; --merge puts the parts together", out.display()));
+        return Ok(ExitCode::SUCCESS);
+    }
+    let result = ChallengeResult::of(arguments.seed, outcomes);
+    tell(arguments, arguments.seed, cases, &result, baseline.as_ref(), terminal)
+}
+
+/// Shows a campaign, and holds it against the baseline or makes it one.
+fn tell(
+    arguments: &Arguments,
+    seed: u64,
+    cases: u64,
+    result: &ChallengeResult,
+    baseline: Option<&DiagnosisBaseline>,
+    terminal: &Terminal,
+) -> Result<ExitCode, Failure> {
+    let now = DiagnosisBaseline::of(seed, cases, &result.cases);
     let check = baseline.map(|baseline| baseline.check(&now));
-    show(&result, terminal)?;
-    terminal.document(&Document { result: &result, check: check.as_ref() })?;
+    show(result, terminal)?;
+    terminal.document(&Document { result, check: check.as_ref() })?;
     if let Some(path) = arguments.check.as_ref().filter(|_| arguments.update) {
         let mut bytes = serde_json::to_vec_pretty(&now)?;
         bytes.push(b'\n');

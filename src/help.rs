@@ -64,7 +64,15 @@ const GROUPS: &[(&str, &[Entry])] = &[
                 ],
             ),
             ("merge", &["yair merge shard-1 shard-2 --out results"]),
-            ("challenge", &["yair challenge --cases 60", "yair challenge --cases 440 --seed 23 --check baseline.json"]),
+            (
+                "challenge",
+                &[
+                    "yair challenge --cases 60",
+                    "yair challenge --cases 440 --seed 23 --check baseline.json",
+                    "yair challenge --cases 2000 --shard 1/4 --out part-1",
+                    "yair challenge --merge part-1 part-2 part-3 part-4",
+                ],
+            ),
         ],
     ),
     ("The paper", &[("reproduce", &["yair reproduce --out paper"])]),

@@ -41,6 +41,7 @@ pub mod command;
 mod calibrate;
 mod calibration_file;
 mod challenge;
+mod challenge_shard;
 mod check;
 mod command_line;
 mod compare;
@@ -78,6 +79,8 @@ mod diagnose_command;
 mod export_command;
 #[path = "fleet/mod.rs"]
 mod fleet_command;
+
+pub use fleet_command::datasets_to_compute;
 
 #[cfg(doctest)]
 mod readmes;

@@ -1,8 +1,11 @@
 //! `--shard I/N` and `--shard auto`: which part of a campaign is this process's, as its cluster says.
 
+use std::path::Path;
 use std::str::FromStr;
 
-use bench::Shard;
+use bench::{FolderLock, Shard};
+
+use crate::terminal::{Failure, Terminal};
 
 /// What `--shard` asks for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,6 +27,33 @@ impl FromStr for ShardChoice {
     }
 }
 
+impl ShardChoice {
+    /// The part that is meant.
+    pub(crate) fn resolved(self, terminal: &Terminal) -> Result<Shard, Failure> {
+        match self {
+            Self::Given(shard) => Ok(shard),
+            Self::Auto => {
+                let (shard, by) =
+                    from_environment(|name| std::env::var(name).ok()).map_err(|why| format!("--shard auto: {why}"))?;
+                terminal.remark(&format!("shard {shard}, by {by}"));
+                Ok(shard)
+            }
+        }
+    }
+}
+
+/// The folder of a part or of a whole campaign, for this process alone.
+pub(crate) fn locked(out: &Path, terminal: &Terminal) -> Result<FolderLock, Failure> {
+    let lock = FolderLock::take(out)?;
+    if let Some(why) = lock.why_not_held() {
+        terminal.remark(&format!(
+            "warning: {}: it cannot be locked ({why}); see to it that no other process writes there",
+            out.display()
+        ));
+    }
+    Ok(lock)
+}
+
 /// A part as I/N, in place of a cluster's variables.
 const SHARD: &str = "YAIR_SHARD";
 /// How many parts there are.
@@ -42,7 +72,7 @@ const SLURM_COUNT: &str = "SLURM_ARRAY_TASK_COUNT";
 const KUBERNETES_INDEX: &str = "JOB_COMPLETION_INDEX";
 
 /// The part that the environment names, and by which variable; `variable` looks one up.
-pub(crate) fn from_environment(variable: impl Fn(&str) -> Option<String>) -> Result<(Shard, &'static str), String> {
+fn from_environment(variable: impl Fn(&str) -> Option<String>) -> Result<(Shard, &'static str), String> {
     // An empty variable is one that a script did not fill.
     let text = |name: &str| variable(name).map(|text| text.trim().to_owned()).filter(|text| !text.is_empty());
     let whole = |name: &str| -> Result<Option<u32>, String> {

@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use bench::{AccuracyCheck, Campaign, FolderLock, Outcome, Shard, SweepOptions, SweepPlan, SweepResult};
+use bench::{AccuracyCheck, Campaign, Outcome, Shard, SweepOptions, SweepPlan, SweepResult};
 use clap::Args;
 use scenario::Scenario;
 use serde::Serialize;
 
 use crate::html_report::write_sweep;
-use crate::shard::{ShardChoice, from_environment};
+use crate::shard::{ShardChoice, locked};
 use crate::terminal::{Failure, INTERRUPTED, Terminal, table};
 use crate::{sweep_summary, sweep_table};
 
@@ -94,7 +94,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         Some(path) if !arguments.update || path.exists() => Some(bench::read_baseline(path)?),
         _ => None,
     };
-    let shard = shard(arguments, terminal)?;
+    let shard = arguments.shard.map_or(Ok(Shard::WHOLE), |shard| shard.resolved(terminal))?;
     // Until the results stand.
     let _lock = match &arguments.out {
         Some(out) => {
@@ -155,32 +155,6 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
             conclude(arguments, terminal, &result, check)
         }
     }
-}
-
-/// The part that is asked for.
-fn shard(arguments: &Arguments, terminal: &Terminal) -> Result<Shard, Failure> {
-    match arguments.shard {
-        None => Ok(Shard::WHOLE),
-        Some(ShardChoice::Given(shard)) => Ok(shard),
-        Some(ShardChoice::Auto) => {
-            let (shard, by) =
-                from_environment(|name| std::env::var(name).ok()).map_err(|why| format!("--shard auto: {why}"))?;
-            terminal.remark(&format!("shard {shard}, by {by}"));
-            Ok(shard)
-        }
-    }
-}
-
-/// The folder for this process alone.
-fn locked(out: &Path, terminal: &Terminal) -> Result<FolderLock, Failure> {
-    let lock = FolderLock::take(out)?;
-    if let Some(why) = lock.why_not_held() {
-        terminal.remark(&format!(
-            "warning: {}: it cannot be locked ({why}); see to it that no other process writes there",
-            out.display()
-        ));
-    }
-    Ok(lock)
 }
 
 /// Says what the comparison with the baseline gave, and writes the baseline anew where that is asked for.

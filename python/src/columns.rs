@@ -7,8 +7,8 @@ use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use yair::dataset::{
-    self, Dataset, DatasetError, Existing, ExtraChannel, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise,
-    TruthSample, TruthSigma, WheelLog,
+    self, Dataset, DatasetError, Existing, ExtraChannel, HeadingReading, NominalRobot, Odometry, PoseCovariance,
+    Provenance, Run, RunInfo, TruthNoise, TruthSample, TruthSigma, WheelLog,
 };
 use yair::kinematics::Wheels;
 
@@ -37,7 +37,7 @@ impl Columns {
     /// A dataset without runs.
     #[new]
     #[pyo3(signature = (*, left_wheel_diameter_m, right_wheel_diameter_m, wheel_separation_m, ticks_per_rev=None,
-        counter_bits=None, name=None, sigma_xy_m=None, sigma_theta_rad=None))]
+        counter_bits=None, name=None, robot_id=None, recorded=None, sigma_xy_m=None, sigma_theta_rad=None))]
     #[expect(clippy::too_many_arguments, reason = "keywords, as dataset.toml has them")]
     fn new(
         left_wheel_diameter_m: f64,
@@ -46,9 +46,13 @@ impl Columns {
         ticks_per_rev: Option<f64>,
         counter_bits: Option<u8>,
         name: Option<String>,
+        robot_id: Option<String>,
+        recorded: Option<String>,
         sigma_xy_m: Option<f64>,
         sigma_theta_rad: Option<f64>,
-    ) -> Self {
+    ) -> PyResult<Self> {
+        let recorded = recorded.map(|text| dataset::parse_recorded(&text)).transpose();
+        let recorded = recorded.map_err(|why| PyValueError::new_err(format!("recorded: {why}")))?;
         let robot = NominalRobot {
             left_wheel_diameter_m,
             right_wheel_diameter_m,
@@ -56,10 +60,10 @@ impl Columns {
             ticks_per_rev,
             counter_bits,
         };
-        let provenance = Provenance { name, ..Provenance::default() };
+        let provenance = Provenance { name, robot_id, recorded, ..Provenance::default() };
         let truth_noise = TruthNoise { sigma_xy_m, sigma_theta_rad, ..TruthNoise::default() };
         let dataset = Dataset { provenance, robot, truth_noise, points: Vec::new(), runs: Vec::new() };
-        Self { dataset, warnings: Vec::new() }
+        Ok(Self { dataset, warnings: Vec::new() })
     }
 
     /// Reads a folder.
@@ -108,8 +112,10 @@ impl Columns {
         Ok(())
     }
 
-    /// Gives the last run its truth; NaN = not seen.
-    #[pyo3(signature = (t_s, x_m, y_m, theta_rad=None, sigma_xy_m=None, sigma_theta_rad=None))]
+    /// Gives the last run its truth; NaN = not seen. A row without x and y is a heading alone. `covariance`
+    /// has the six columns of elements in the format's order; NaN is 0 there.
+    #[pyo3(signature = (t_s, x_m, y_m, theta_rad=None, sigma_xy_m=None, sigma_theta_rad=None, covariance=None))]
+    #[expect(clippy::too_many_arguments, reason = "columns, as truth.csv has them")]
     fn add_truth(
         &mut self,
         t_s: Numbers<'_>,
@@ -118,29 +124,53 @@ impl Columns {
         theta_rad: Option<Numbers<'_>>,
         sigma_xy_m: Option<Numbers<'_>>,
         sigma_theta_rad: Option<Numbers<'_>>,
+        covariance: Option<[Numbers<'_>; 6]>,
     ) -> PyResult<()> {
         let known = |column: &Option<Numbers<'_>>, row: usize| {
             let value = column.as_ref().map(|column| column.as_array()[row]);
             value.filter(|value| !value.is_nan())
         };
         let (t_s, x_m, y_m) = (t_s.as_array(), x_m.as_array(), y_m.as_array());
-        let given = [&theta_rad, &sigma_xy_m, &sigma_theta_rad];
-        let lengths = given.into_iter().flatten().map(|column| column.as_array().len());
+        let given = [&theta_rad, &sigma_xy_m, &sigma_theta_rad].into_iter().flatten();
+        let lengths = given.chain(covariance.iter().flatten()).map(|column| column.as_array().len());
         if let Some(other) = lengths.chain([x_m.len(), y_m.len()]).find(|length| *length != t_s.len()) {
             return Err(PyValueError::new_err(format!("truth: a column has {other} rows, t_s has {}", t_s.len())));
         }
+        let stated_rad = self.dataset.truth_noise.sigma_theta_rad;
         let Some(run) = self.dataset.runs.last_mut() else {
             return Err(PyValueError::new_err("truth before the first run"));
         };
-        let sample = |row: usize| TruthSample::new(t_s[row], x_m[row], y_m[row], known(&theta_rad, row));
-        let sigma = |row: usize| TruthSigma {
-            sigma_xy_m: known(&sigma_xy_m, row),
-            sigma_theta_rad: known(&sigma_theta_rad, row),
-            covariance: None,
-        };
-        let has_sigma = sigma_xy_m.is_some() || sigma_theta_rad.is_some();
-        run.truth = (0..t_s.len()).map(sample).collect();
-        run.truth_sigma = has_sigma.then(|| (0..t_s.len()).map(sigma).collect());
+        let mut sigmas = Vec::with_capacity(t_s.len());
+        for row in 0..t_s.len() {
+            let theta_rad = known(&theta_rad, row);
+            let elements = covariance.as_ref().map_or([0.0; 6], |columns| {
+                columns.each_ref().map(|column| Some(column.as_array()[row]).filter(|of| !of.is_nan()).unwrap_or(0.0))
+            });
+            let stated = PoseCovariance::stated(elements)
+                .map_err(|why| PyValueError::new_err(format!("truth: the covariance of row {row} is none: {why}")))?;
+            let positive = |sigma: &f64| *sigma != 0.0;
+            let sigma = TruthSigma {
+                sigma_xy_m: known(&sigma_xy_m, row).filter(positive),
+                sigma_theta_rad: known(&sigma_theta_rad, row).filter(positive),
+                covariance: stated.and_then(|all| if theta_rad.is_some() { Some(all) } else { all.of_position() }),
+            };
+            match theta_rad.filter(|_| x_m[row].is_nan() && y_m[row].is_nan()) {
+                None => {
+                    run.truth.push(TruthSample::new(t_s[row], x_m[row], y_m[row], theta_rad));
+                    sigmas.push(sigma);
+                }
+                Some(theta_rad) => {
+                    let of_row = stated.map(|all| all.tt_rad2.sqrt()).filter(positive).or(sigma.sigma_theta_rad);
+                    let sigma_rad = of_row.or(stated_rad).ok_or_else(|| {
+                        let why = "a heading without a position needs sigma_theta_rad, in the row or of the instrument";
+                        PyValueError::new_err(format!("truth: row {row}: {why}"))
+                    })?;
+                    run.headings.push(HeadingReading { t_s: t_s[row], theta_rad, sigma_rad });
+                }
+            }
+        }
+        // A run has the column once it has something to say.
+        run.truth_sigma = sigmas.iter().any(|sigma| *sigma != TruthSigma::UNKNOWN).then_some(sigmas);
         Ok(())
     }
 
@@ -206,15 +236,37 @@ impl Columns {
         Ok(columns)
     }
 
-    /// The columns of a run's truth, by the names of truth.csv; NaN = not seen.
+    /// The columns of a run's truth, by the names of truth.csv; NaN = not seen. Those of the rows' precision
+    /// are there where a row states it.
     fn truth<'py>(&self, py: Python<'py>, run: usize) -> PyResult<Bound<'py, PyDict>> {
-        let truth = &self.run(run)?.truth;
+        let run = self.run(run)?;
+        let sigma_of = |row: usize| run.truth_sigma.as_ref().map_or(TruthSigma::UNKNOWN, |sigmas| sigmas[row]);
+        let poses = run.truth.iter().enumerate().map(|(row, sample)| (*sample, sigma_of(row)));
+        let headings = run.headings.iter().map(|of| {
+            let sigma = TruthSigma { sigma_theta_rad: Some(of.sigma_rad), ..TruthSigma::UNKNOWN };
+            (TruthSample::new(of.t_s, f64::NAN, f64::NAN, Some(of.theta_rad)), sigma)
+        });
+        let mut rows: Vec<(TruthSample, TruthSigma)> = poses.chain(headings).collect();
+        rows.sort_by(|(a, _), (b, _)| a.t_s.total_cmp(&b.t_s));
         let columns = PyDict::new(py);
-        let column = |of: fn(&TruthSample) -> f64| PyArray1::from_iter(py, truth.iter().map(of));
-        columns.set_item("t_s", column(|sample| sample.t_s))?;
-        columns.set_item("x_m", column(|sample| sample.x_m))?;
-        columns.set_item("y_m", column(|sample| sample.y_m))?;
-        columns.set_item("theta_rad", column(|sample| sample.theta_rad().unwrap_or(f64::NAN)))?;
+        let column = |name: &str, of: &dyn Fn(&(TruthSample, TruthSigma)) -> f64| {
+            columns.set_item(name, PyArray1::from_iter(py, rows.iter().map(of)))
+        };
+        column("t_s", &|(sample, _)| sample.t_s)?;
+        column("x_m", &|(sample, _)| sample.x_m)?;
+        column("y_m", &|(sample, _)| sample.y_m)?;
+        column("theta_rad", &|(sample, _)| sample.theta_rad().unwrap_or(f64::NAN))?;
+        if rows.iter().any(|(_, sigma)| sigma.sigma_xy_m.is_some()) {
+            column("sigma_xy_m", &|(_, sigma)| sigma.sigma_xy_m.unwrap_or(f64::NAN))?;
+        }
+        if rows.iter().any(|(_, sigma)| sigma.sigma_theta_rad.is_some()) {
+            column("sigma_theta_rad", &|(_, sigma)| sigma.sigma_theta_rad.unwrap_or(f64::NAN))?;
+        }
+        if rows.iter().any(|(_, sigma)| sigma.covariance.is_some()) {
+            for (element, name) in PoseCovariance::COLUMNS.into_iter().enumerate() {
+                column(name, &|(_, sigma)| sigma.covariance.map_or(f64::NAN, |all| all.elements()[element]))?;
+            }
+        }
         Ok(columns)
     }
 }

@@ -1,14 +1,16 @@
 //! `yair._yair`: the command and its datasets for Python. What a Python user meets is in `package/yair/`;
-//! here is what only Rust can do: running the command without the interpreter's lock, and columns from and to numpy.
+//! here is what only Rust can do: running the command without the interpreter's lock, and columns from and to
+//! numpy.
 
 mod columns;
 
 use std::ffi::OsString;
+use std::path::PathBuf;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use pyo3::exceptions::PyRuntimeError;
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use yair::command::{self, Call, Watch};
 
@@ -76,11 +78,23 @@ fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
     py.detach(|| command::main(arguments))
 }
 
+/// Datasets in or below these folders of which the folder `out` of a fleet keeps no result.
+#[pyfunction]
+fn datasets_to_compute(
+    py: Python<'_>,
+    dirs: Vec<PathBuf>,
+    out: PathBuf,
+    calibrate_only: bool,
+) -> PyResult<Vec<PathBuf>> {
+    py.detach(|| yair::datasets_to_compute(&dirs, &out, calibrate_only)).map_err(PyValueError::new_err)
+}
+
 /// The Rust half of the package.
 #[pymodule]
 fn _yair(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<columns::Columns>()?;
     module.add_function(wrap_pyfunction!(call, module)?)?;
+    module.add_function(wrap_pyfunction!(datasets_to_compute, module)?)?;
     module.add_function(wrap_pyfunction!(main, module)?)
 }

@@ -1,6 +1,7 @@
 """Datasets from arrays and tables, and what is refused of them."""
 
 import re
+import tempfile
 
 import numpy as np
 import pandas as pd
@@ -133,3 +134,128 @@ def test_csv_of_any_columns_is_imported(tmp_path):
     assert data.robot["wheel_separation_m"] == 0.3
     with pytest.raises(yair.Error, match="--base"):
         yair.Dataset.import_csv(tmp_path / "log.csv", out=tmp_path / "other", wheel=0.15)
+
+
+def test_rows_of_truth_keep_their_covariance(robot, tmp_path):
+    odometry, truth, nominal = columns_of(robot)
+    rows = len(truth)
+    # A long ellipse, with rows of which nothing is known, positions alone and headings alone.
+    elements = {"cov_xx": 4e-6, "cov_xy": 1e-6, "cov_xt": 0.0, "cov_yy": 1e-6, "cov_yt": 0.0, "cov_tt": 9e-6}
+    for name, value in elements.items():
+        truth[name] = np.where(np.arange(rows) % 5 == 1, np.nan, value)
+    truth.loc[truth.index % 5 == 2, "theta_rad"] = np.nan
+    truth.loc[truth.index % 5 == 3, ["x_m", "y_m"]] = np.nan
+    made = yair.Dataset.from_arrays(
+        odometry["t_s"],
+        odometry["left_ticks"],
+        odometry["right_ticks"],
+        run=odometry["run"],
+        truth=truth,
+        **given(nominal),
+        name="robot",
+    )
+    # As somebody writes the folder by hand: what the file says is what the arrays say.
+    made.write(tmp_path / "made")
+    truth.to_csv(tmp_path / "made" / "truth.csv", index=False)
+    by_hand = yair.Dataset.read(tmp_path / "made")
+    frames = yair.Dataset.from_frames(odometry, truth, **given(nominal), name="robot")
+    assert made.calibrate().json == by_hand.calibrate().json == frames.calibrate().json
+    plain = truth.drop(columns=list(elements)).dropna(subset=["x_m"])
+    without = yair.Dataset.from_frames(odometry, plain, **given(nominal), name="robot")
+    assert made.calibrate().json != without.calibrate().json
+    for run in made.runs:
+        seen, read = made.truth(run), by_hand.truth(run)
+        assert set(seen) == set(read) == {"t_s", "x_m", "y_m", "theta_rad", "sigma_theta_rad", *elements}
+        assert all(np.array_equal(seen[key], read[key], equal_nan=True) for key in seen)
+        assert np.nanmax(seen["cov_xy"]) == 1e-6 and np.isnan(seen["cov_tt"]).any()
+
+
+@pytest.mark.parametrize(
+    ("truth", "message"),
+    [
+        ({"cov_xx": 1.0}, r"truth: no column cov_xy, .*the six columns of a covariance come together"),
+        (
+            dict.fromkeys(["cov_xx", "cov_yy", "cov_tt", "cov_xt", "cov_yt"], 1.0) | {"cov_xy": 2.0},
+            r"covariance of row 0",
+        ),
+    ],
+)
+def test_a_covariance_that_is_none_is_refused(truth, message):
+    seen = dict(zip(("t_s", "x_m", "y_m", "theta_rad"), circle()["truth"], strict=True))
+    seen |= {name: np.full(200, value) for name, value in truth.items()}
+    with pytest.raises(yair.Error, match=message):
+        yair.Dataset.from_arrays(**circle(truth=seen))
+
+
+def tables():
+    """Every table of the format but truth, of one run on a circle."""
+    t = circle()["t"]
+    return {
+        "displacement": pd.DataFrame({"t0_s": [0.0], "t1_s": [1.0], "dx_m": [0.1], "dy_m": [0.0], "dtheta_rad": [0.1]}),
+        "points": pd.DataFrame({"t_s": [0.0, 5.0], "point": ["left", "left"], "x_m": [0.0, 0.5], "y_m": [0.1, 0.5]}),
+        "wheel_reference": pd.DataFrame({"t_s": t[1:3], "left_mps": [0.03, 0.03], "right_mps": [0.05, 0.05]}),
+        "revisit": pd.DataFrame({"t0_s": [0.0], "t1_s": [19.0], "sigma_xy_m": [0.002], "sigma_theta_rad": [np.nan]}),
+        "distance": pd.DataFrame({"t0_s": [0.0], "t1_s": [4.0], "distance_m": [0.7], "sigma_m": [0.002]}),
+        "wall": pd.DataFrame(
+            {"t_s": [1.0, 2.0], "wall": ["north"] * 2, "distance_m": [1.0, 1.1], "sigma_m": [0.01] * 2}
+        ),
+        "gyro": pd.DataFrame({"t_s": t[::2], "omega_radps": np.full(100, 0.046)}),
+    }
+
+
+def test_every_table_of_the_format_passes(tmp_path):
+    of = circle()
+    odometry = pd.DataFrame({"t_s": of["t"], "left_ticks": of["left"], "right_ticks": of["right"]})
+    odometry["gyro_radps"] = np.where(of["t"] > 1.0, 0.1, np.nan)
+    odometry["cmd_v_mps"] = np.float32(0.1)
+    odometry["battery_v"] = 12.0
+    robot = {"wheel_diameter_m": 0.15, "wheel_separation_m": 0.3, "ticks_per_rev": 4096}
+    runs = pd.DataFrame({"id": ["000"], "protocol": ["circle_ccw"], "radius_m": [0.9], "payload_kg": [2.5]})
+    with pytest.warns(yair.YairWarning, match="battery_v") as caught:
+        made = yair.Dataset.from_frames(
+            odometry,
+            **tables(),
+            marks={"left": (0.0, 0.2)},
+            runs=runs,
+            **robot,
+            robot_id="cart-7",
+            recorded="2026-11-23T09:00:00+01:00",
+            manifest={"gyro": {"scale_sigma": 0.01}, "truth": {"sigma_xy_m": 0.001}},
+        )
+    assert caught[0].filename == __file__
+    assert set(made.odometry()) == {"t_s", "left_ticks", "right_ticks", "cmd_v_mps", "gyro_radps"}
+    # The shortest digits of a single-precision number are another number.
+    assert made.odometry()["cmd_v_mps"][0] == float(np.float32(0.1)) and np.isnan(made.odometry()["gyro_radps"][0])
+    folder = made.write(tmp_path / "made")
+    manifest = (folder / "dataset.toml").read_text()
+    for line in (
+        'id = "cart-7"',
+        "2026-11-23T08:00:00Z",
+        "payload_kg = 2.5",
+        'protocol = "circle_ccw"',
+        "scale_sigma = 0.01",
+    ):
+        assert line in manifest, manifest
+    for name, table in tables().items():
+        written = pd.read_csv(folder / f"{name}.csv", dtype={"run": str})
+        assert len(written) == len(table) and set(table) | {"run"} <= set(written), name
+        pd.testing.assert_frame_equal(written[list(table)], table, check_exact=True, check_dtype=False)
+
+
+def test_tables_that_are_wrong_name_table_and_line():
+    of = circle()
+    odometry = pd.DataFrame({"t_s": of["t"], "left_ticks": of["left"], "right_ticks": of["right"]})
+    robot = {"wheel_diameter_m": 0.15, "wheel_separation_m": 0.3, "ticks_per_rev": 4096}
+    spoiled = tables()["gyro"].assign(omega_radps=[0.0] * 3 + [np.inf] + [0.0] * 96)
+    tape = tables()["distance"]
+    for tables_given, message in [
+        ({"gyro": spoiled, "distance": tape}, r"^gyro\.csv:5"),
+        ({"distance": tape.rename(columns={"sigma_m": "sigma"})}, r"^distance\.csv.*sigma_m"),
+        ({"distance": tape.assign(run="a")}, "distance: it has a column run, and odometry has none"),
+        ({}, r"no truth|none of|truth"),
+        ({"distance": tape, "runs": pd.DataFrame({"id": ["b"]})}, 'runs: it has a run "b"'),
+        ({"distance": tape, "manifest": {"gyro": {"scale": 1.0}}}, r"dataset\.toml.*scale"),
+    ]:
+        with pytest.raises(yair.Error, match=message) as raised:
+            yair.Dataset.from_frames(odometry, **tables_given, **robot)
+        assert tempfile.gettempdir() not in str(raised.value)

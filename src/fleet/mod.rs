@@ -146,6 +146,18 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     }
 }
 
+/// Datasets in or below these folders, as `yair fleet` finds them, of which the folder of its `--out` keeps
+/// no result yet: what other machines may be given to compute. A dataset that cannot be read is among them.
+///
+/// # Errors
+/// A message that names the folder: it is not there, it has no dataset, or another process writes into `out`.
+pub fn datasets_to_compute(dirs: &[PathBuf], out: &Path, calibrate_only: bool) -> Result<Vec<PathBuf>, String> {
+    let datasets = datasets_of(dirs).map_err(|failure| failure.to_string())?;
+    let store = SessionStore::open(out).map_err(|failure| failure.to_string())?;
+    let is_kept = |path: &PathBuf| store::key(path, calibrate_only).is_ok_and(|key| store.read(&key).is_some());
+    Ok(datasets.into_iter().filter(|path| !is_kept(path)).collect())
+}
+
 /// Refuses a place for a file before anything is computed.
 fn refuse_no_file(file: &Path) -> Result<(), Failure> {
     let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));

@@ -67,6 +67,13 @@ function pages() {
   yair("plan", "robot", "--out", "plan");
   yair("sweep", join(root, "scenarios/noise-levels.toml"), "--trials", "20", "--out", "sweep");
   yair("reproduce", "--trials", "20", "--out", "reproduce");
+  // Two carts on two days, one with a tyre that wears in between (docs/fleet.md).
+  const fleet = join(root, "scenarios/fleet.toml");
+  for (const [cart, day, point, seed] of [[1, 23, 1, 11], [1, 24, 1, 12], [2, 23, 1, 21], [2, 24, 3, 22]])
+    yair("simulate", fleet, "--point", `${point}`, "--seed", `${seed}`, "--out", `robots/cart-${cart}/${day}`,
+      "--robot-id", `cart-${cart}`, "--recorded", `2026-11-${day}T08:00:00Z`);
+  mkdirSync(join(work, "fleet"));
+  yair("fleet", "robots", "--html", "fleet/report.html");
   const drive = { runs: true };
   return {
     found: { ...drive, answers: ["Cause", "Size", "Gain", "Drive next"], small: true },
@@ -74,6 +81,7 @@ function pages() {
     ambiguous: { ...drive, next: true },
     "hostile-page": { ...drive, hostile: true },
     calibrate: drive, evaluate: drive, compare: { plain: true }, plan: { still: true }, sweep: {}, reproduce: {},
+    fleet: { small: true, answers: ["Robots with an excess", "Changes", "Failed datasets"] },
   };
 }
 

@@ -151,3 +151,31 @@ fn of_two_processes_that_begin_at_once_one_ends_well() {
     });
     assert!(codes == [Some(0), Some(1)] || codes == [Some(1), Some(0)], "{codes:?}");
 }
+
+#[test]
+fn parts_of_the_blind_benchmark_merge_to_the_bytes_of_one_machine() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    let campaign = ["challenge", "--cases", "3", "--seed", "5", "--quiet"];
+    let part = |shard: &str, out: &str| {
+        succeed(folder, &[&campaign[..], &["--shard", shard, "--out", out]].concat());
+    };
+    part("1/2", "a");
+    part("2/2", "b");
+    let merge = ["challenge", "--json", "--merge"];
+    let merged = succeed(folder, &[&merge[..], &["b", "a"]].concat()).stdout;
+    assert_eq!(merged, succeed(folder, &[&campaign[..], &["--json"]].concat()).stdout);
+    part("1/1", "whole");
+    succeed(folder, &["challenge", "--cases", "1", "--seed", "6", "--shard", "2/2", "--out", "other", "--quiet"]);
+    for (parts, why) in [
+        (&["a"][..], "the parts after 1/2 are missing"),
+        (&["b"], "part 1/2 is missing"),
+        (&["a", "a"], "part 1/2 is given twice"),
+        (&["a", "other"], "seed: 6"),
+        (&["a", "whole"], "given twice"),
+        (&["nothing"], "no challenge.shard.json"),
+    ] {
+        let refused = refusal(folder, &[&merge[..], parts].concat());
+        assert!(refused.contains(why), "{parts:?}: {refused}");
+    }
+}

@@ -20,7 +20,7 @@ use crate::oracle_view::{OracleView, form_share, has_random_signature, known_non
 use crate::scope::Scope;
 
 /// What a case asks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CaseKind {
     /// Nothing is hidden.

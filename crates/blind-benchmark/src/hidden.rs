@@ -14,7 +14,7 @@ use super::draw::Draw;
 use super::robot::RandomRobot;
 
 /// What kind of effect an id is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum EffectKind {
     /// It adds to the mean.

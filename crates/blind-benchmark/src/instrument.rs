@@ -13,7 +13,7 @@ use super::conditions::{Conditions, Stamps};
 use super::draw::{CaseDraws, Draw};
 
 /// What the measurements are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TruthKind {
     /// Poses several times a second.
@@ -29,7 +29,7 @@ pub enum TruthKind {
 }
 
 /// What the measurements err by, and what the log loses.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum NoiseClass {
     /// Independent normal errors.

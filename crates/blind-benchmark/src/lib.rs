@@ -35,6 +35,7 @@ mod strata;
 mod tests;
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use rayon::prelude::*;
 
@@ -123,6 +124,16 @@ pub fn challenge_datasets(scope: Scope, seed: u64, number: u64) -> Result<Vec<da
     Ok(Case::draw(scope, seed, number)?.map(|case| case.datasets).unwrap_or_default())
 }
 
+/// What came of a case.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CaseOutcome {
+    /// What was hidden and what was found.
+    Scored(Box<CaseResult>),
+    /// The effect that no robot drawn for the case shows, by its id.
+    NeverShown(String),
+}
+
 /// Drives the cases of a scope on so many threads, 0 for one a core, and scores them; `done` is called after
 /// each.
 ///
@@ -135,26 +146,50 @@ pub fn challenge(
     jobs: usize,
     done: &(dyn Fn() + Sync),
 ) -> Result<ChallengeResult, ChallengeError> {
+    Ok(ChallengeResult::of(seed, challenge_outcomes(seed, 0..cases, scope, jobs, done)?))
+}
+
+/// Drives those of the numbered cases that the scope asks for, as [`challenge`] does, and gives what came of
+/// each in the order of their numbers: a part of a campaign.
+///
+/// # Errors
+/// As [`challenge`].
+pub fn challenge_outcomes(
+    seed: u64,
+    numbers: Range<u64>,
+    scope: Scope,
+    jobs: usize,
+    done: &(dyn Fn() + Sync),
+) -> Result<Vec<CaseOutcome>, ChallengeError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build();
     let pool = pool.map_err(|error| ChallengeError::Threads { jobs, why: error.to_string() })?;
     let is_included = |number: &u64| scope != Scope::Guarded || case::is_guarded(*number);
     let one = |number| {
         let result = challenge_case(scope, seed, number);
         done();
-        result
+        result.map(|outcome| match outcome {
+            Ok(result) => CaseOutcome::Scored(Box::new(result)),
+            Err(id) => CaseOutcome::NeverShown(id.to_owned()),
+        })
     };
-    let results: Vec<Result<CaseResult, &'static str>> =
-        pool.install(|| (0..cases).into_par_iter().filter(is_included).map(one).collect::<Result<_, _>>())?;
-    let (mut scored, mut never_shown) = (Vec::new(), BTreeMap::new());
-    for result in results {
-        match result {
-            Ok(result) => scored.push(result),
-            Err(id) => *never_shown.entry(id.to_owned()).or_insert(0) += 1,
+    pool.install(|| numbers.into_par_iter().filter(is_included).map(one).collect())
+}
+
+impl ChallengeResult {
+    /// The measures over all cases of a campaign, whose parts are given one behind the other.
+    #[must_use]
+    pub fn of(seed: u64, outcomes: Vec<CaseOutcome>) -> Self {
+        let (mut cases, mut never_shown) = (Vec::new(), BTreeMap::new());
+        for outcome in outcomes {
+            match outcome {
+                CaseOutcome::Scored(result) => cases.push(*result),
+                CaseOutcome::NeverShown(id) => *never_shown.entry(id).or_insert(0) += 1,
+            }
         }
+        let measures = measure::measures(seed, &cases);
+        let strata = by_stratum(seed, &cases);
+        Self { seed, measures, strata, confusions: confusions(&cases), never_shown, cases }
     }
-    let measures = measure::measures(seed, &scored);
-    let strata = by_stratum(seed, &scored);
-    Ok(ChallengeResult { seed, measures, strata, confusions: confusions(&scored), never_shown, cases: scored })
 }
 
 fn by_stratum(seed: u64, cases: &[CaseResult]) -> Vec<StratumMeasures> {

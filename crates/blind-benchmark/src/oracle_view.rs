@@ -5,7 +5,7 @@ use crate::oracle::Detectability;
 use crate::power::{DISCRIMINATION_LEVEL, detection_limit};
 
 /// What the oracle knows of a hidden effect.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct OracleView {
     /// The effect.
     pub id: String,

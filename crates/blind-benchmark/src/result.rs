@@ -11,7 +11,7 @@ use super::robot::PathFamily;
 use super::strata::{DrawnConditions, Strata};
 
 /// One finding, as far as it is scored.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Reported {
     /// Its names, most probable first.
     pub names: Vec<String>,
@@ -29,7 +29,7 @@ pub struct Reported {
 }
 
 /// What the case was and what came of it.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CaseResult {
     /// The case's number: with the seed, all that it takes to drive it again.
     pub case: u64,
@@ -116,7 +116,7 @@ impl CaseResult {
 }
 
 /// What came of the planned run of a case whose one mean effect was found among several names.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Planned {
     /// The set before.
     pub names: Vec<String>,

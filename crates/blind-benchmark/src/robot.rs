@@ -19,7 +19,7 @@ use super::ripple::SLACK_GAIN;
 const TEMPLATE: &str = scenario::MOTION_CAPTURE;
 
 /// What paths a case has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PathFamily {
     /// Straights in both directions, spins, squares and circles.

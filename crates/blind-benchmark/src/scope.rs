@@ -1,7 +1,8 @@
 //! Which cases of a campaign are driven.
 
 /// Which cases of a campaign are driven, and how far.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Scope {
     /// All of them, with planned runs and gains.
     Whole,

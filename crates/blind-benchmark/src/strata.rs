@@ -11,7 +11,7 @@ use super::instrument::{InstrumentModel, NoiseClass, TruthKind};
 macro_rules! levels {
     ($(#[$doc:meta])* $Name:ident { $($(#[$level_doc:meta])* $Level:ident,)+ }) => {
         $(#[$doc])*
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
         #[serde(rename_all = "snake_case")]
         pub enum $Name { $($(#[$level_doc])* $Level,)+ }
     };
@@ -176,7 +176,7 @@ levels! {
 }
 
 /// The strata of a case.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Strata {
     /// Ticks for a turn of a wheel.
     pub encoder: EncoderLevel,
@@ -207,7 +207,7 @@ pub struct Strata {
 }
 
 /// The numbers behind the strata.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct DrawnConditions {
     /// Wheelbase, metres.
     pub wheel_separation_m: f64,

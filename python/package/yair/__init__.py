@@ -4,8 +4,22 @@ Everything is computed by the core of the command `yair`, in this process; resul
 command's JSON. Lengths are metres, angles radians, times seconds.
 """
 
+from . import cluster
 from ._yair import __version__
-from .api import calibrate, check, correct, diagnose, evaluate, fleet, merge, plan, simulate, sweep
+from .api import (
+    calibrate,
+    challenge,
+    check,
+    correct,
+    diagnose,
+    evaluate,
+    fleet,
+    merge,
+    merge_challenge,
+    plan,
+    simulate,
+    sweep,
+)
 from .call import Error, YairWarning
 from .dataset import Dataset
 from .result import Record, Result
@@ -18,12 +32,15 @@ __all__ = [
     "YairWarning",
     "__version__",
     "calibrate",
+    "challenge",
     "check",
+    "cluster",
     "correct",
     "diagnose",
     "evaluate",
     "fleet",
     "merge",
+    "merge_challenge",
     "plan",
     "simulate",
     "sweep",

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,11 @@ def call(
     arguments: Sequence[str | os.PathLike[str]], progress: Callable[[str, int, int], object] | None = None
 ) -> tuple[int, str | None, list[str], str | None]:
     """Exit code, JSON document, remarks and message of the command with these arguments."""
+
+def datasets_to_compute(
+    dirs: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str], calibrate_only: bool
+) -> list[Path]:
+    """Datasets in or below these folders of which the folder `out` of a fleet keeps no result."""
 
 def main(arguments: Sequence[str]) -> int:
     """Runs the command as a process does and returns its exit code."""
@@ -28,6 +34,8 @@ class Columns:
         ticks_per_rev: float | None = None,
         counter_bits: int | None = None,
         name: str | None = None,
+        robot_id: str | None = None,
+        recorded: str | None = None,
         sigma_xy_m: float | None = None,
         sigma_theta_rad: float | None = None,
     ) -> None: ...
@@ -51,6 +59,7 @@ class Columns:
         theta_rad: NDArray[np.float64] | None = None,
         sigma_xy_m: NDArray[np.float64] | None = None,
         sigma_theta_rad: NDArray[np.float64] | None = None,
+        covariance: Sequence[NDArray[np.float64]] | None = None,
     ) -> None: ...
     @property
     def warnings(self) -> list[str]: ...

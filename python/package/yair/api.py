@@ -180,11 +180,16 @@ def fleet(
     Folders are searched two levels deep for datasets. `out` keeps what was found for the next call. Datasets
     that fail are in `failed`, and stop no other.
     """
+    return _fleet(dirs, out, out, progress, jobs=jobs, calibrate_only=calibrate_only, fdr=fdr, csv=csv)
+
+
+def _fleet(
+    dirs: Sequence[PathLike], kept: PathLike | None, out: PathLike | None, progress: Progress | None, **options: Any
+) -> Result:
+    """`fleet` whose page goes elsewhere than to what is `kept`."""
     folder, temporary = _folder(out)
     folder.mkdir(parents=True, exist_ok=True)
-    flags = _options(
-        out=out, jobs=jobs, calibrate_only=calibrate_only, fdr=fdr, csv=csv, html=folder / "report.html"
-    )
+    flags = _options(out=kept, html=folder / "report.html", **options)
     with _removed_on_failure(folder, temporary):
         # 1: a dataset failed, which the document tells.
         text, remarks = call(["fleet", *dirs, *flags], progress, accepted=(0, 1))
@@ -252,6 +257,31 @@ def merge(*shards: PathLike, out: PathLike) -> Result:
     """The shards of a sweep as one result, that of one machine to the bit."""
     text, remarks = call(["merge", *shards, *_options(out=out)])
     return _result(text, remarks, rows.estimator_rows, Path(out))
+
+
+def challenge(
+    *,
+    cases: int | None = None,
+    seed: int = 1,
+    large: bool = False,
+    shard: str | None = None,
+    out: PathLike | None = None,
+    jobs: int = 0,
+    progress: Progress | None = None,
+) -> Result | None:
+    """The blind benchmark of `diagnose`: random robots with hidden effects, scored against an oracle.
+
+    A shard ("2/4", or "auto" on a cluster) leaves its part in `out` for `merge_challenge` and returns None.
+    """
+    flags = _options(cases=cases, seed=seed, large=large, shard=shard, out=out, jobs=jobs)
+    text, remarks = call(["challenge", *flags], progress)
+    return None if text is None else _result(text, remarks, rows.measure_rows)
+
+
+def merge_challenge(*parts: PathLike) -> Result:
+    """The parts of a blind benchmark as one result, that of one machine to the bit."""
+    text, remarks = call(["challenge", "--merge", *parts])
+    return _result(text, remarks, rows.measure_rows)
 
 
 def _result(

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _yair
 from .call import Error, YairWarning, call
+from .frames import columns_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -33,6 +34,9 @@ WHEELS = {
 
 TRUTH = ("t_s", "x_m", "y_m", "theta_rad", "sigma_xy_m", "sigma_theta_rad")
 """Columns of truth.csv, as `truth=` takes them by order or by name."""
+
+COVARIANCE = ("cov_xx", "cov_xy", "cov_xt", "cov_yy", "cov_yt", "cov_tt")
+"""Further columns of truth.csv, which `truth=` takes by name, all six together."""
 
 LARGEST_EXACT = 2.0**53
 """Counts up to here are exact in double precision."""
@@ -94,28 +98,37 @@ class Dataset:
         sigma_xy_m: float | None = None,
         sigma_theta_rad: float | None = None,
         name: str = "arrays",
+        robot_id: str | None = None,
+        recorded: str | None = None,
     ) -> Dataset:
         """A dataset from columns.
 
         `left` and `right` are cumulative counts (`wheels="ticks"`), cumulative angles ("rad"), speeds of the
         contacts ("mps"), or forward speed and yaw rate ("twist"). `truth` has t, x, y and, where it was
-        measured, the heading, each in its order or by the names of truth.csv; NaN = not measured. `run` names
+        measured, the heading, each in its order or by the names of truth.csv, covariances of rows (`cov_xx` to
+        `cov_tt`) included; NaN = not measured, and of a row without x and y the heading alone was. `run` names
         the run of every row; the truth then has a column `run` too. The sigmas are the instrument's, one
-        standard deviation; without them they are estimated.
+        standard deviation; without them they are estimated. `robot_id` and `recorded` (RFC 3339) are what
+        `fleet` groups and orders sessions by.
         """
         if wheels not in WHEELS:
             raise Error(f'wheels: "{wheels}" is none of {", ".join(WHEELS)}')
         both = wheel_diameter_m if isinstance(wheel_diameter_m, tuple) else (wheel_diameter_m, wheel_diameter_m)
-        columns = _yair.Columns(
-            left_wheel_diameter_m=both[0],
-            right_wheel_diameter_m=both[1],
-            wheel_separation_m=wheel_separation_m,
-            ticks_per_rev=ticks_per_rev,
-            counter_bits=counter_bits,
-            name=name,
-            sigma_xy_m=sigma_xy_m,
-            sigma_theta_rad=sigma_theta_rad,
-        )
+        try:
+            columns = _yair.Columns(
+                left_wheel_diameter_m=both[0],
+                right_wheel_diameter_m=both[1],
+                wheel_separation_m=wheel_separation_m,
+                ticks_per_rev=ticks_per_rev,
+                counter_bits=counter_bits,
+                name=name,
+                robot_id=robot_id,
+                recorded=recorded,
+                sigma_xy_m=sigma_xy_m,
+                sigma_theta_rad=sigma_theta_rad,
+            )
+        except ValueError as error:
+            raise Error(str(error)) from None
         t_s = _column("t", t)
         sides = [_column("left", left), _column("right", right)]
         for side, values in zip(("left", "right"), sides, strict=True):
@@ -133,7 +146,12 @@ class Dataset:
         for id, rows in pieces.items():
             columns.add_run(id, wheels, t_s[rows], sides[0][rows], sides[1][rows])
             of = slice(None) if seen_pieces is None else seen_pieces.get(id, np.zeros(0, dtype=np.intp))
-            columns.add_truth(**{key: values[of] for key, values in seen.items()})
+            rows_of = {key: values[of] for key, values in seen.items()}
+            covariance = [rows_of.pop(key) for key in COVARIANCE if key in rows_of]
+            try:
+                columns.add_truth(**rows_of, covariance=covariance or None)
+            except ValueError as error:
+                raise Error(f'run "{id}": {error}') from None
         try:
             columns.check_writable()
         except ValueError as error:
@@ -142,19 +160,64 @@ class Dataset:
         return cls(columns)
 
     @classmethod
-    def from_frames(cls, odometry: pandas.DataFrame, truth: pandas.DataFrame, **robot: Any) -> Dataset:
-        """A dataset from two tables with the columns of odometry.csv and truth.csv; the robot as in `from_arrays`."""
-        for wheels, names in WHEELS.items():
-            if all(name in odometry for name in names):
-                left, right = (odometry[name].to_numpy() for name in names)
-                break
-        else:
-            known = "; ".join(", ".join(names) for names in WHEELS.values())
-            raise Error(f"odometry: no columns of wheels among {', '.join(map(str, odometry))}; expected {known}")
-        if "t_s" not in odometry:
-            raise Error(f"odometry: no column t_s among {', '.join(map(str, odometry))}")
-        run = odometry["run"].to_numpy() if "run" in odometry else None
-        return cls.from_arrays(odometry["t_s"].to_numpy(), left, right, truth=truth, wheels=wheels, run=run, **robot)
+    def from_frames(
+        cls,
+        odometry: pandas.DataFrame,
+        truth: pandas.DataFrame | None = None,
+        *,
+        displacement: pandas.DataFrame | None = None,
+        points: pandas.DataFrame | None = None,
+        wheel_reference: pandas.DataFrame | None = None,
+        revisit: pandas.DataFrame | None = None,
+        distance: pandas.DataFrame | None = None,
+        wall: pandas.DataFrame | None = None,
+        gyro: pandas.DataFrame | None = None,
+        runs: pandas.DataFrame | None = None,
+        marks: Mapping[str, tuple[float, float]] | None = None,
+        wheel_diameter_m: float | tuple[float, float],
+        wheel_separation_m: float,
+        ticks_per_rev: float | None = None,
+        counter_bits: int | None = None,
+        sigma_xy_m: float | None = None,
+        sigma_theta_rad: float | None = None,
+        name: str = "arrays",
+        robot_id: str | None = None,
+        recorded: str | None = None,
+        manifest: Mapping[str, Mapping[str, Any]] | None = None,
+    ) -> Dataset:
+        """A dataset from tables, each with the columns of the file of its name; messages count lines as there.
+
+        Without a column `run` all tables are of one run. Columns that the format does not know are left out
+        with a warning. `runs` has a row a run: `id`, `protocol`, `payload_kg` and whatever `[[run]]` of
+        dataset.toml may have. `marks` are the points of the robot that `points` speaks of, (x, y) in metres.
+        `manifest` has further keys of dataset.toml by section: `{"gyro": {"scale_sigma": 0.01}}`. The robot is as
+        in `from_arrays`.
+        """
+        both = wheel_diameter_m if isinstance(wheel_diameter_m, tuple) else (wheel_diameter_m, wheel_diameter_m)
+        sections: dict[str, dict[str, Any]] = {
+            "robot": {
+                "id": robot_id,
+                "left_wheel_diameter_m": both[0],
+                "right_wheel_diameter_m": both[1],
+                "wheel_separation_m": wheel_separation_m,
+                "ticks_per_rev": ticks_per_rev,
+                "counter_bits": counter_bits,
+            },
+            "truth": {"sigma_xy_m": sigma_xy_m, "sigma_theta_rad": sigma_theta_rad},
+        }
+        for section, keys in (manifest or {}).items():
+            sections[section] = {**sections.get(section, {}), **keys}
+        tables = {
+            "truth": truth,
+            "displacement": displacement,
+            "points": points,
+            "wheel_reference": wheel_reference,
+            "revisit": revisit,
+            "distance": distance,
+            "wall": wall,
+            "gyro": gyro,
+        }
+        return cls(columns_of(odometry, tables, sections, runs, marks or {}, {"name": name, "recorded": recorded}))
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Dataset:
@@ -283,12 +346,16 @@ def _truth(truth: Any) -> tuple[dict[str, NDArray[np.float64]], ArrayLike | None
         named, run = dict(zip(TRUTH, truth, strict=False)), None
     else:
         keys = [str(key) for key in truth]
-        unknown = [key for key in keys if key not in (*TRUTH, "run")]
+        known = (*TRUTH, *COVARIANCE)
+        unknown = [key for key in keys if key not in (*known, "run")]
         missing = [key for key in TRUTH[:3] if key not in keys]
         if unknown or missing:
             what = f"unknown columns {', '.join(unknown)}" if unknown else f"no column {', '.join(missing)}"
-            raise Error(f"truth: {what}; expected {', '.join((*TRUTH, 'run'))}, of which the first three are needed")
-        named = {key: truth[key] for key in TRUTH if key in keys}
+            raise Error(f"truth: {what}; expected {', '.join((*known, 'run'))}, of which the first three are needed")
+        without = [key for key in COVARIANCE if key not in keys]
+        if 0 < len(without) < len(COVARIANCE):
+            raise Error(f"truth: no column {', '.join(without)}; the six columns of a covariance come together")
+        named = {key: truth[key] for key in known if key in keys}
         run = truth["run"] if "run" in keys else None
     columns = {key: _column(f"truth {key}", values) for key, values in named.items()}
     for key, values in columns.items():

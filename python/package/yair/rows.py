@@ -77,6 +77,11 @@ def estimator_rows(document: Record) -> list[dict[str, Any]]:
     ]
 
 
+def measure_rows(document: Record) -> list[dict[str, Any]]:
+    """A row a measure of the blind benchmark."""
+    return [measure.to_dict() for measure in document.measures]
+
+
 def pose_tables(document: Record) -> pandas.DataFrame:
     """The corrected poses of all runs, from their files."""
     import pandas

@@ -5,6 +5,7 @@
 //! on ends where an undisturbed campaign would have. Points that are done stand in it as results; points of
 //! which this shard has a part only, as sums.
 
+use std::ops::Range;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -40,14 +41,17 @@ impl Shard {
         if number >= 1 && number <= of { Some(Self { number, of }) } else { None }
     }
 
-    /// Where the shard's share of `units` begins.
-    const fn first(self, units: u64) -> u64 {
-        units * (self.number as u64 - 1) / self.of as u64
+    /// The shard's share of `units` that are counted from 0; the shares of all shards follow each other.
+    #[must_use]
+    pub const fn share(self, units: u64) -> Range<u64> {
+        let (number, of) = (self.number as u64, self.of as u64);
+        units * (number - 1) / of..units * number / of
     }
 
-    /// Where it ends.
-    const fn end(self, units: u64) -> u64 {
-        units * self.number as u64 / self.of as u64
+    /// Its number, from 1, and how many there are.
+    #[must_use]
+    pub const fn of_all(self) -> (u32, u32) {
+        (self.number, self.of)
     }
 }
 
@@ -153,7 +157,8 @@ impl State {
         let chunks = if plan.precision.is_some() { 1 } else { plan.chunks() };
         let units = points as u64 * chunks;
         let place = |unit: u64| ChunkIndex { point: (unit / chunks) as usize, chunk: unit % chunks };
-        let (first, end) = (place(shard.first(units)), place(shard.end(units)));
+        let share = shard.share(units);
+        let (first, end) = (place(share.start), place(share.end));
         Ok(Self {
             campaign: Identity::of(plan, rows)?,
             shard,
@@ -247,9 +252,9 @@ mod tests {
     fn shards_are_read_and_cover_everything_once() {
         for of in 1..12_u32 {
             let shards: Vec<Shard> = (1..=of).map(|number| Shard::new(number, of).expect("within")).collect();
-            assert_eq!(shards[0].first(1000), 0);
-            assert_eq!(shards.last().expect("one").end(1000), 1000);
-            assert!(shards.windows(2).all(|pair| pair[0].end(1000) == pair[1].first(1000)));
+            assert_eq!(shards[0].share(1000).start, 0);
+            assert_eq!(shards.last().expect("one").share(1000).end, 1000);
+            assert!(shards.windows(2).all(|pair| pair[0].share(1000).end == pair[1].share(1000).start));
         }
         assert_eq!("2/8".parse(), Ok(Shard { number: 2, of: 8 }));
         for wrong in ["0/8", "9/8", "2", "2/", "a/b", "1/0", "-1/3"] {
