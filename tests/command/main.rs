@@ -18,6 +18,8 @@ mod import_ros2;
 mod import_tum;
 #[cfg(unix)]
 mod interrupt;
+#[cfg(unix)]
+mod kills;
 mod limits;
 mod pages;
 mod partial;
