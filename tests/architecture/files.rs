@@ -73,6 +73,30 @@ fn the_repository_names_no_path_of_a_machine_and_no_registry() {
     }
 }
 
+/// How the time of day is read.
+const TIME_OF_DAY: [&str; 5] = ["SystemTime", "Timestamp::now", "Zoned::now", "clock_gettime", "Local::now"];
+
+/// A clock that jumps changes nothing: the time of day is read nowhere, and `Instant`, which does not jump, by
+/// files that show how long something took or write a state now and then.
+#[test]
+fn nothing_reads_the_time_of_day() {
+    let reads = |source: &str| TIME_OF_DAY.into_iter().find(|name| source.contains(name));
+    assert_eq!(reads("let now = jiff::Timestamp::now();"), Some("Timestamp::now"));
+    let mut with_instants = Vec::new();
+    for file in
+        files("src").into_iter().chain(files("crates")).filter(|file| file.extension().is_some_and(|of| of == "rs"))
+    {
+        let source = text(&file);
+        assert_eq!(reads(&source), None, "{}", file.display());
+        if source.contains("Instant::now") {
+            with_instants.push(file.strip_prefix(root()).unwrap_or(&file).display().to_string());
+        }
+    }
+    with_instants.sort();
+    let known = ["crates/bench/src/sweep/campaign.rs", "src/challenge.rs", "src/reproduce.rs", "src/sparse_lines.rs"];
+    assert_eq!(with_instants, [&known[..], &["src/sweep.rs"]].concat());
+}
+
 #[test]
 fn every_scenario_file_parses_survives_writing_and_can_be_simulated() {
     let scenarios = files("scenarios");
