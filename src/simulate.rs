@@ -204,7 +204,12 @@ pub(crate) fn write_folder<T>(
     std::fs::create_dir_all(folder).map_err(failed)?;
     // The temporary folder's random name would tell the user nothing: only the kind of the error is shown.
     let work = WorkFolder::beside(folder).map_err(|error| format!("{}: {}", out.display(), error.kind()))?;
-    let written = write(work.made())?;
+    // A file is named by the place that it is to have.
+    let named = |error: Failure| {
+        let (made, out) = (work.made().display().to_string(), out.display().to_string());
+        Failure::from(error.to_string().replace(&made, &out))
+    };
+    let written = write(work.made()).map_err(named)?;
     if is_there {
         std::fs::remove_dir(&target).map_err(failed)?;
     }

@@ -104,7 +104,8 @@ impl Writer {
             _ => Path::new("."),
         };
         fs::create_dir_all(parent).map_err(|source| io_error(parent, source))?;
-        let work = WorkFolder::beside(parent).map_err(|source| io_error(parent, source))?;
+        // The name of the folder under way would tell the user nothing: only the kind of the error is shown.
+        let work = WorkFolder::beside(parent).map_err(|source| io_error(&target, io::Error::from(source.kind())))?;
         let (infos, ids, tables) = (Vec::new(), BTreeSet::new(), Default::default());
         Ok(Self { header, columns, target, existing, work, infos, ids, form: None, tables })
     }
@@ -134,7 +135,7 @@ impl Writer {
                 }
                 out.as_mut().map_or(Ok(()), |out| (kind.rows)(run, &self.header.points, columns, out))
             };
-            rows().map_err(|source| io_error(&file, source))?;
+            rows().map_err(|source| io_error(&self.target.join(kind.file), source))?;
         }
         self.infos.push(run.info.clone());
         Ok(())
@@ -158,9 +159,9 @@ impl Writer {
         }
         let (made, target) = (self.work.made(), &self.target);
         let file = made.join(MANIFEST);
-        fs::write(&file, toml).map_err(|source| io_error(&file, source))?;
+        fs::write(&file, toml).map_err(|source| io_error(&target.join(MANIFEST), source))?;
         for (kind, out) in TABLES.iter().zip(self.tables) {
-            out.map_or(Ok(()), |mut out| out.flush()).map_err(|source| io_error(&made.join(kind.file), source))?;
+            out.map_or(Ok(()), |mut out| out.flush()).map_err(|source| io_error(&target.join(kind.file), source))?;
         }
         // Asked again: while the runs were written someone else may have come.
         if !may_write(target, self.existing)? {
