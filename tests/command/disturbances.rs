@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::interrupt::long_table;
-use crate::support::{Ended, everything_in, refusal, run_in, succeed};
+use crate::support::{Ended, everything_in, run_in, succeed};
 
 const YAIR: &str = env!("CARGO_BIN_EXE_yair");
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
@@ -94,8 +94,9 @@ fn a_place_that_cannot_be_written_is_named() {
         format!("sweep {ROOT}/scenarios/paper.toml --trials 2 --out {place} --quiet"),
         format!("calibrate {ROOT}/tests/evo/robot --out {place}/c.toml --quiet"),
     ] {
-        let said = refusal(here, &line.split_whitespace().collect::<Vec<_>>());
-        assert!(said.contains(place), "{line}: {said}");
+        let ended = run_in(here, &line.split_whitespace().collect::<Vec<_>>());
+        failed(&ended, &line);
+        assert!(ended.stderr.contains(place), "{line}: {}", ended.stderr);
     }
 }
 

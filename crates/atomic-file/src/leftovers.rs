@@ -123,9 +123,9 @@ pub(crate) fn locked_file(folder: &Path) -> io::Result<NamedTempFile> {
     Err(io::Error::other("what is written there is taken away by another process"))
 }
 
-/// Takes away what killed processes left in a folder: files and folders under way that nobody has locked. What
-/// cannot be read or removed stays, and so does a folder that a kill caught between two renames: it holds
-/// what was to be replaced.
+/// Takes away what killed processes left in a folder: files and folders under way that nobody has locked.
+/// What cannot be read or removed stays, and so does a folder that a kill caught between two renames: it
+/// holds what was to be replaced.
 pub fn remove_leftovers(folder: &Path) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     let is_ours = |entry: &fs::DirEntry| entry.file_name().to_string_lossy().starts_with(PREFIX);
