@@ -131,22 +131,28 @@ pub fn remove_leftovers(folder: &Path) {
     let is_ours = |entry: &fs::DirEntry| entry.file_name().to_string_lossy().starts_with(PREFIX);
     for entry in entries.flatten().filter(is_ours) {
         let path = entry.path();
-        match entry.file_type() {
-            Ok(kind) if kind.is_file() => {
-                let _ = without_owner(&path, || fs::remove_file(&path));
-            }
-            Ok(kind) if kind.is_dir() && !(path.join(MADE).exists() && path.join(REPLACED).exists()) => {
-                // The empty one of a process that has just begun may go too: it then makes another.
-                if fs::remove_dir(&path).is_err() {
-                    let _ = without_owner(&path.join(LOCK), || {
-                        empty(&path);
-                        fs::remove_dir_all(&path)
-                    });
-                }
-            }
-            _ => {}
-        }
+        let removed = match entry.file_type() {
+            Ok(kind) if kind.is_file() => without_owner(&path, || fs::remove_file(&path)),
+            Ok(kind) if kind.is_dir() => remove_folder(&path),
+            _ => Ok(()),
+        };
+        // What stays is in nobody's way.
+        drop(removed);
     }
+}
+
+/// Takes away a folder under way without an owner, unless it holds what was to be replaced.
+fn remove_folder(path: &Path) -> io::Result<()> {
+    if path.join(MADE).exists() && path.join(REPLACED).exists() {
+        return Ok(());
+    }
+    // The empty one of a process that has just begun may go too: it then makes another.
+    fs::remove_dir(path).or_else(|_| {
+        without_owner(&path.join(LOCK), || {
+            empty(path);
+            fs::remove_dir_all(path)
+        })
+    })
 }
 
 /// Does something while a file is locked, if nobody else has it and locks mean something here.
