@@ -1,5 +1,5 @@
-//! Results written in one piece: a file or a folder is whole under its name, or it is not there; what a killed
-//! process leaves is taken away by the next; and files read up to a limit.
+//! Results written in one piece: a file or a folder is whole under its name, or it is not there; what a
+//! killed process leaves is taken away by the next; and files read up to a limit.
 
 mod leftovers;
 pub mod lock;
