@@ -2,8 +2,8 @@
 
 use rand::{Rng, RngExt};
 
-/// Bytes to which a repetition lets a text grow: far more than a line or an object may have, and little beside
-/// the memory that an execution may take.
+/// Bytes to which a repetition lets a text grow: far more than a line or an object may have, and little
+/// beside the memory that an execution may take.
 const MAX_REPEATED_BYTES: usize = 1 << 24;
 
 /// Numbers at which code goes wrong.
@@ -244,7 +244,7 @@ fn repeated(text: &[u8], random: &mut impl Rng) -> Vec<u8> {
     all.concat()
 }
 
-/// `censi:5008848`: a line that was repeated three times over had 486 MB, and the memory was the mutator's own.
+/// `censi:5008848`: a line that was repeated three times over had 486 MB, all of it the mutator's own.
 #[test]
 fn repetitions_of_repetitions_stay_within_their_limit() {
     use rand::SeedableRng;

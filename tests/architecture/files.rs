@@ -77,8 +77,8 @@ fn the_repository_names_no_path_of_a_machine_and_no_registry() {
 /// How the time of day is read.
 const TIME_OF_DAY: [&str; 5] = ["SystemTime", "Timestamp::now", "Zoned::now", "clock_gettime", "Local::now"];
 
-/// A clock that jumps changes nothing: the time of day is read nowhere, and `Instant`, which does not jump, by
-/// files that show how long something took or write a state now and then.
+/// A clock that jumps changes nothing: the time of day is read nowhere, and `Instant`, which does not jump,
+/// by files that show how long something took or write a state now and then.
 #[test]
 fn nothing_reads_the_time_of_day() {
     let reads = |source: &str| TIME_OF_DAY.into_iter().find(|name| source.contains(name));

@@ -1,5 +1,5 @@
-//! Disks that are full, places that cannot be written, input that changes while it is read, two processes with
-//! one folder, and numbers of threads: what is there afterwards is whole, or a line says what is wrong.
+//! Disks that are full, places that cannot be written, input that changes while it is read, two processes
+//! with one folder, and numbers of threads: what is there afterwards is whole, or a line says what is wrong.
 
 use std::fs;
 use std::io::Write;

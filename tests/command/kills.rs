@@ -38,8 +38,8 @@ fn task(name: &'static str, line: &str, out: &'static str, goes_on_by: Option<&'
     Task { name, arguments, out, goes_on_by }
 }
 
-/// The commands of a campaign, with the trials of a sweep and of a third of one and the rows of a table; their
-/// sources in `here`.
+/// The commands of a campaign, with the trials of a sweep and of a third of one and the rows of a table;
+/// their sources in `here`.
 fn tasks(here: &Path, trials: [u32; 2], rows: u32) -> Vec<Task> {
     let root = env!("CARGO_MANIFEST_DIR");
     fs::write(here.join("log.csv"), long_table(rows)).expect("written");

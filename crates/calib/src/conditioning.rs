@@ -1,4 +1,4 @@
-//! The condition of normal equations: what they determine by their roundings alone is refused with the number.
+//! The condition of normal equations: what they determine by roundings alone is refused with the number.
 
 use nalgebra::DMatrix;
 
