@@ -71,3 +71,11 @@ pictures:
 # Mutated input for every reader, 20 minutes of processor time each; docs/reliability.md has its table
 fuzz:
     .ci/run fuzz
+
+# kill -9 at two hundred random instants of imports, diagnoses and sweeps; docs/reliability.md has its table
+kills:
+    .ci/run kills
+
+# Licences, sources and duplicate versions of the dependencies, and those that nobody uses; needs cargo-deny and cargo-machete
+dependencies:
+    .ci/run dependencies

@@ -9,8 +9,10 @@ use yair::command::{Watch, call};
 /// The files of one input: path in its folder, and bytes.
 pub(crate) type Sample = Vec<(String, Vec<u8>)>;
 
+/// The repository: Cargo says where it is when it starts the program. One that is started by hand has been
+/// built there, or is told another place.
 fn root() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+    std::env::var_os("CARGO_MANIFEST_DIR").map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")), PathBuf::from)
 }
 
 fn files(folder: &Path) -> Vec<PathBuf> {

@@ -7,7 +7,8 @@
 //! function of its target and its number, so that a finding is repeated by `YAIR_FUZZ_AT=TARGET:NUMBER`.
 //!
 //! `cargo test` runs a few hundred executions a target. `.ci/run fuzz MINUTES` runs each target for so many
-//! minutes of processor time and prints the executions; it is a campaign by hand.
+//! minutes of processor time and prints the executions; it is a campaign by hand. `YAIR_FUZZ_AFTER=LOG` goes
+//! on behind the executions that a campaign's output lists, so that campaigns add up.
 
 #![allow(clippy::print_stdout)] // what a campaign found
 
@@ -37,6 +38,9 @@ const MAX_BYTES: usize = 1 << 30;
 
 /// Executions of each target in `cargo test`, before its cost divides them.
 const SMOKE_EXECUTIONS: u64 = 40;
+
+/// Findings of a target that a campaign prints with their numbers: more are mostly the same.
+const MAX_TOLD: u64 = 10;
 
 /// How an execution ended.
 enum Ended {
@@ -112,6 +116,26 @@ fn processor_s() -> Option<f64> {
     Some(0.01 * ticks as f64)
 }
 
+/// The first number of a target that no campaign has run whose rows stand in a text: `| target | first |
+/// executions | …`.
+fn first_after(rows: &str, target: &str) -> Option<u64> {
+    let end_of = |row: &str| {
+        let mut cells = row.trim().strip_prefix('|')?.split('|').map(str::trim);
+        let (name, first, executions) = (cells.next()?, cells.next()?, cells.next()?);
+        (name == target).then_some(first.parse::<u64>().ok()?.checked_add(executions.parse().ok()?)?)
+    };
+    rows.lines().filter_map(end_of).max()
+}
+
+#[test]
+fn a_campaign_goes_on_behind_the_last_row_of_its_target() {
+    let rows = "| target | first | executions |\n| --- | --- | --- |\n| csv | 1000000 | 50 | 7 |\n| csv | 1000050 | 5 | 1 |\n\
+                YAIR_FUZZ_AT=csv:1000052: 21.0 s\n| tum | 7 | 1 | 1 |\n| bad | 18446744073709551615 | 1 |\n";
+    assert_eq!(first_after(rows, "csv"), Some(1_000_055));
+    assert_eq!(first_after(rows, "tum"), Some(8));
+    assert_eq!((first_after(rows, "bad"), first_after(rows, "censi")), (None, None));
+}
+
 /// Which number is under way, for executions that end the process: memory that runs out, a stack that does.
 fn note(line: &str) {
     if let Ok(file) = std::env::var("YAIR_FUZZ_NOTE") {
@@ -141,28 +165,37 @@ fn campaign() {
     }
     let minutes: f64 = std::env::var("YAIR_FUZZ_MINUTES").ok().and_then(|text| text.parse().ok()).unwrap_or(20.0);
     let first: u64 = std::env::var("YAIR_FUZZ_FIRST").ok().and_then(|text| text.parse().ok()).unwrap_or(1_000_000);
+    let before = std::env::var("YAIR_FUZZ_AFTER").map_or_else(
+        |_| String::new(),
+        |log| std::fs::read_to_string(&log).unwrap_or_else(|error| panic!("YAIR_FUZZ_AFTER={log}: {error}")),
+    );
     let mut findings = 0;
-    println!("| target | executions | accepted | processor s | findings |\n| --- | --- | --- | --- | --- |");
+    println!(
+        "| target | first | executions | accepted | processor s | findings |\n| --- | --- | --- | --- | --- | --- |"
+    );
     for target in TARGETS.iter().filter(|target| only.as_ref().is_none_or(|name| name == target.name)) {
         let corpus = (target.corpus)();
         let budget = Duration::from_secs_f64(60.0 * minutes).as_secs_f64();
         let (clock, started_s) = (Instant::now(), processor_s());
         let spent = || processor_s().zip(started_s).map_or(clock.elapsed().as_secs_f64(), |(now, then)| now - then);
-        let (mut accepted, mut number, mut told) = (0_u64, 0_u64, Vec::new());
+        let first = first_after(&before, target.name).unwrap_or(first);
+        let (mut accepted, mut number, mut found) = (0_u64, 0_u64, 0);
         while spent() < budget {
             note(&format!("{}:{}", target.name, first + number));
             match emptied(&folder, |inside| execute(target, &corpus, first + number, inside)) {
                 Ended::Accepted => accepted += 1,
                 Ended::Refused => {}
-                Ended::Finding(what) => told.push((first + number, what)),
+                Ended::Finding(what) => {
+                    found += 1;
+                    if found <= MAX_TOLD {
+                        println!("YAIR_FUZZ_AT={}:{}: {what}", target.name, first + number);
+                    }
+                }
             }
             number += 1;
         }
-        println!("| {} | {number} | {accepted} | {:.0} | {} |", target.name, spent(), told.len());
-        for (at, what) in told.iter().take(10) {
-            println!("YAIR_FUZZ_AT={}:{at}: {what}", target.name);
-        }
-        findings += told.len();
+        println!("| {} | {first} | {number} | {accepted} | {:.0} | {found} |", target.name, spent());
+        findings += found;
     }
     assert_eq!(findings, 0, "findings, as listed above");
 }

@@ -2,6 +2,10 @@
 
 use rand::{Rng, RngExt};
 
+/// Bytes to which a repetition lets a text grow: far more than a line or an object may have, and little
+/// beside the memory that an execution may take.
+const MAX_REPEATED_BYTES: usize = 1 << 24;
+
 /// Numbers at which code goes wrong.
 const NUMBERS: [&str; 28] = [
     "0",
@@ -234,7 +238,22 @@ fn repeated(text: &[u8], random: &mut impl Rng) -> Vec<u8> {
         return Vec::new();
     }
     let at = random.random_range(0..all.len());
-    let new = all[at].repeat(*pick(&[2, 10, 100, 3000], random));
+    let room = MAX_REPEATED_BYTES.saturating_sub(text.len()) / all[at].len();
+    let new = all[at].repeat((*pick(&[2, 10, 100, 3000], random)).min(room.max(1)));
     all[at] = &new;
     all.concat()
+}
+
+/// `censi:5008848`: a line that was repeated three times over had 486 MB, all of it the mutator's own.
+#[test]
+fn repetitions_of_repetitions_stay_within_their_limit() {
+    use rand::SeedableRng;
+    let mut random = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(1);
+    let (line, mut longest) = (b"0.4636".repeat(10), 0);
+    for _ in 0..20 {
+        let text = (0..6).fold(line.clone(), |text, _| repeated(&text, &mut random));
+        longest = longest.max(text.len());
+    }
+    // Without the limit the longest of these has hundreds of megabytes.
+    assert!((MAX_REPEATED_BYTES / 2..=MAX_REPEATED_BYTES).contains(&longest), "{longest} bytes");
 }

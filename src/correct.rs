@@ -4,6 +4,7 @@ use std::fmt::Write;
 use std::path::{Component, Path, PathBuf};
 use std::process::ExitCode;
 
+use atomic_file::WorkFolder;
 use calib::{CorrectedRun, corrected_run};
 use clap::Args;
 use dataset::{Dataset, Loaded, RunByRun, Warning};
@@ -68,8 +69,8 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let beside = out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let unwritable = |error: std::io::Error| format!("{}: {}", out.display(), error.kind());
     std::fs::create_dir_all(beside).map_err(unwritable)?;
-    let waiting = tempfile::tempdir_in(beside).map_err(unwritable)?;
-    let mut files = Files { waiting: waiting.path(), written: Vec::new() };
+    let waiting = WorkFolder::beside(beside).map_err(unwritable)?;
+    let mut files = Files { waiting: waiting.made(), written: Vec::new() };
     let mut datasets = Vec::with_capacity(paths.len());
     for path in &paths {
         let inside = if paths.len() > 1 { PathBuf::from(folder_name(path)) } else { PathBuf::new() };
@@ -83,7 +84,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         let target = out.join(file);
         let inside = file.parent().unwrap_or(Path::new(""));
         let moved =
-            atomic_file::create_inside(out, inside).and_then(|()| std::fs::rename(waiting.path().join(file), &target));
+            atomic_file::create_inside(out, inside).and_then(|()| std::fs::rename(waiting.made().join(file), &target));
         moved.map_err(|error| format!("{}: {error}", target.display()))?;
     }
     calibration.remark(terminal);

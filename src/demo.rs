@@ -113,7 +113,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
 
     let mut datasets = vec![first];
     let mut given = vec![path("robot")];
-    let mut diagnosis = diagnosed(&datasets, &given, &path("diagnosis"), terminal)
+    let mut diagnosis = diagnosed(&datasets, &given, (&path("diagnosis"), arguments.force), terminal)
         .map_err(|why| format!("{} was hidden, and it cannot be diagnosed: {why}", hidden.id))?;
     terminal.say(&format!("2. It was calibrated and diagnosed. {}.", diagnosis.document.sentence))?;
     tell(&diagnosis, terminal)?;
@@ -145,7 +145,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
             datasets.push(driven);
         }
         terminal.say(&format!("4. It drove what the diagnosis asked for: {}.", next.drive))?;
-        match diagnosed(&datasets, &given, &path("diagnosis-after-plan"), terminal) {
+        match diagnosed(&datasets, &given, (&path("diagnosis-after-plan"), arguments.force), terminal) {
             Ok(after) => {
                 diagnosis = after;
                 report = path("diagnosis-after-plan").join("report.html");
@@ -262,10 +262,15 @@ fn drawn(id: &'static str, robot: &Scenario, draws: Address) -> Result<Hidden, &
     Err("no physical size of it was drawn")
 }
 
-fn diagnosed(datasets: &[Dataset], given: &[PathBuf], out: &Path, terminal: &Terminal) -> Result<Diagnosis, Failure> {
+fn diagnosed(
+    datasets: &[Dataset],
+    given: &[PathBuf],
+    (out, force): (&Path, bool),
+    terminal: &Terminal,
+) -> Result<Diagnosis, Failure> {
     terminal.remark(&format!("diagnosing {} runs", datasets.iter().map(|of| of.runs.len()).sum::<usize>()));
     let mut diagnosis = ::diagnose::diagnose(datasets, &Options::default())?;
-    write_diagnosis(&mut diagnosis, datasets, given, out)?;
+    write_diagnosis(&mut diagnosis, datasets, given, (out, force))?;
     Ok(diagnosis)
 }
 

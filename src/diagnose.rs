@@ -47,7 +47,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     bar.finish_and_clear();
     let mut diagnosis = diagnosis?;
     if let Some(out) = &arguments.out {
-        write_diagnosis(&mut diagnosis, &datasets, &arguments.datasets, out)?;
+        write_diagnosis(&mut diagnosis, &datasets, &arguments.datasets, (out, arguments.force))?;
         terminal.remark(&format!(
             "findings in {}; report.html is to be looked at, report.md has the same text",
             out.display()
@@ -66,14 +66,15 @@ pub(crate) fn shown_on(bar: ProgressBar) -> OnStage {
     OnStage::call(move |stage: Stage| advance(&bar, stage.name, stage.done))
 }
 
-/// Writes the files of a diagnosis into a folder, which is made where it is not there.
+/// Writes the files of a diagnosis into a folder, which is made where it is not there; into one with files in
+/// it where that is forced.
 pub(crate) fn write_diagnosis(
     diagnosis: &mut Diagnosis,
     datasets: &[Dataset],
     given: &[PathBuf],
-    out: &Path,
+    (out, force): (&Path, bool),
 ) -> Result<(), Failure> {
-    write_folder(out, |folder| {
+    write_folder(out, force, |folder| {
         if let Ok(scenario) = &diagnosis.extended {
             let name = "extended.toml";
             let text = [reservations(&diagnosis.document), scenario.to_toml()?].concat();

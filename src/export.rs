@@ -35,9 +35,16 @@ pub(crate) struct Arguments {
     /// File to write; standard output when left out. For `tum` a folder, with RUN.tum of every run.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Replace a file that is already there; export the geometry of an extended model without its effects.
+    /// --replace and --without-effects together.
     #[arg(long)]
     force: bool,
+    /// Replace a file that is already there.
+    #[arg(long)]
+    replace: bool,
+    /// Export the geometry of an extended model in a format that cannot express its effects: it was fitted
+    /// beside them and is not right alone.
+    #[arg(long)]
+    without_effects: bool,
     /// A dataset of the robot, for nominal values that the calibration file does not have; c: with absolute
     /// truth, also for the drift that is left on board.
     #[arg(long, value_name = "DIR")]
@@ -76,7 +83,7 @@ pub(crate) struct Arguments {
 const TUM: &str = "tum";
 const MCAP: &str = "mcap";
 /// Flags of calibrations alone, and of datasets alone.
-const OF_CALIBRATIONS: [&str; 2] = ["dataset", "method"];
+const OF_CALIBRATIONS: [&str; 3] = ["dataset", "method", "without-effects"];
 const OF_DATASETS: [&str; 2] = ["calibration", "run"];
 
 fn formats() -> String {
@@ -141,7 +148,7 @@ fn export_bag(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Fa
         terminal.failure("mcap: a bag is no text for standard output; give --out FILE.mcap");
         return Ok(ExitCode::from(2));
     };
-    refuse_taken(out, arguments.force)?;
+    refuse_taken(out, arguments.replaces())?;
     let calibrations: Vec<Vec<GivenCalibration>> =
         arguments.calibrations.iter().map(|file| GivenCalibration::read(file)).collect::<Result<_, _>>()?;
     let calibrations: Vec<GivenCalibration> = calibrations.into_iter().flatten().collect();
@@ -162,8 +169,14 @@ impl Arguments {
             ("counter-bits", self.counter_bits.is_some()),
             ("calibration", !self.calibrations.is_empty()),
             ("run", self.run.is_some()),
+            ("without-effects", self.without_effects),
         ];
         given.into_iter().filter_map(|(flag, is_given)| is_given.then_some(flag)).collect()
+    }
+
+    /// Whether files that are there may be replaced.
+    const fn replaces(&self) -> bool {
+        self.force || self.replace
     }
 
     fn options(&self) -> Options {
@@ -180,7 +193,7 @@ impl Arguments {
 
 fn export_calibration(format: &Exporter, arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
     if let Some(out) = &arguments.out {
-        refuse_taken(out, arguments.force)?;
+        refuse_taken(out, arguments.replaces())?;
     }
     let options = arguments.options();
     options.check()?;
@@ -191,7 +204,7 @@ fn export_calibration(format: &Exporter, arguments: &Arguments, terminal: &Termi
         .left_out(format.has_effects)
         .map(|effect| LeftOut { id: effect.id, meaning: effect.meaning, why: why(effect.on_board) })
         .collect();
-    if !format.has_effects && !arguments.force {
+    if !format.has_effects && !arguments.force && !arguments.without_effects {
         refuse_misleading(format, &robot, &arguments.source)?;
     }
     for LeftOut { id, meaning, why } in &left_out {
@@ -244,7 +257,7 @@ fn refuse_misleading(format: &Exporter, robot: &CalibratedRobot, source: &Path) 
     }
     Err(format!(
         "{}: its geometry is right beside {}, which {} cannot express; export the calibration.toml that `yair diagnose --out` writes beside it, or \
-         `yair export c {0}`; --force writes it all the same",
+         `yair export c {0}`; --without-effects writes it all the same",
         source.display(),
         beside.join(", "),
         format.name
@@ -253,12 +266,12 @@ fn refuse_misleading(format: &Exporter, robot: &CalibratedRobot, source: &Path) 
 }
 
 /// Refuses to replace a file, unless that is asked for.
-fn refuse_taken(out: &Path, force: bool) -> Result<(), Failure> {
+fn refuse_taken(out: &Path, replace: bool) -> Result<(), Failure> {
     if out.is_dir() {
         return Err(format!("{}: it is a folder, where a file belongs; give a file's name", out.display()).into());
     }
-    if out.exists() && !force {
-        let why = "already exists; nothing was written: choose another name, or give --force";
+    if out.exists() && !replace {
+        let why = "already exists; nothing was written: choose another name, or give --replace";
         return Err(format!("{}: {why}", out.display()).into());
     }
     Ok(())
@@ -321,7 +334,7 @@ fn export_dataset(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let path = &arguments.source;
     let place = path.display().to_string();
     if let Some(out) = &arguments.out {
-        refuse_filled(out, arguments.force)?;
+        refuse_filled(out, arguments.replaces())?;
     }
     let calibration = match &arguments.calibrations[..] {
         [] => None,

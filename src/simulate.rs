@@ -4,6 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use atomic_file::{WorkFolder, remove_leftovers};
 use clap::Args;
 use dataset::{Dataset, DatasetError, Existing, Writer};
 use effects::Address;
@@ -173,6 +174,7 @@ fn create_parents(path: &Path) -> Result<(), Failure> {
 
 /// Refuses a folder that has something in it, unless `force` says to write into it.
 pub(crate) fn refuse_filled(out: &Path, force: bool) -> Result<(), Failure> {
+    remove_leftovers(out);
     let taken = out.read_dir().map_or_else(|_| out.exists(), |mut entries| entries.next().is_some());
     if taken && (!force || !out.is_dir()) {
         let why = "already exists and is not an empty folder; nothing was written: choose another folder, or give --force to write into it";
@@ -182,29 +184,36 @@ pub(crate) fn refuse_filled(out: &Path, force: bool) -> Result<(), Failure> {
 }
 
 /// Writes a folder in one piece: `write` fills another one, which then takes the name. One that has files
-/// already is written into file by file.
-pub(crate) fn write_folder<T>(out: &Path, write: impl FnOnce(&Path) -> Result<T, Failure>) -> Result<T, Failure> {
+/// already is written into file by file, where `force` says so: another process may have filled it since
+/// [`refuse_filled`] looked.
+pub(crate) fn write_folder<T>(
+    out: &Path,
+    force: bool,
+    write: impl FnOnce(&Path) -> Result<T, Failure>,
+) -> Result<T, Failure> {
     let failed = |error: io::Error| format!("{}: {error}", out.display());
     // The folder itself where `out` is a link to it or ends in `..`, as only that can be renamed.
     let target = out.canonicalize().unwrap_or_else(|_| out.to_owned());
     let is_there = target.is_dir();
     if target.exists() && (!is_there || target.read_dir().map_err(failed)?.next().is_some()) {
+        refuse_filled(out, force)?;
         std::fs::create_dir_all(out).map_err(failed)?;
         return write(out);
     }
     let folder = folder_of(&target);
     std::fs::create_dir_all(folder).map_err(failed)?;
     // The temporary folder's random name would tell the user nothing: only the kind of the error is shown.
-    let beside = tempfile::Builder::new().prefix(".writing-").tempdir_in(folder);
-    let beside = beside.map_err(|error| format!("{}: {}", out.display(), error.kind()))?;
-    // The folder that tempfile makes is private to the user; the one inside has the usual permissions.
-    let made = beside.path().join("made");
-    std::fs::create_dir(&made).map_err(failed)?;
-    let written = write(&made)?;
+    let work = WorkFolder::beside(folder).map_err(|error| format!("{}: {}", out.display(), error.kind()))?;
+    // A file is named by the place that it is to have.
+    let named = |error: Failure| {
+        let (made, out) = (work.made().display().to_string(), out.display().to_string());
+        Failure::from(error.to_string().replace(&made, &out))
+    };
+    let written = write(work.made()).map_err(named)?;
     if is_there {
         std::fs::remove_dir(&target).map_err(failed)?;
     }
-    std::fs::rename(&made, &target).map_err(failed)?;
+    work.rename_to(&target).map_err(failed)?;
     Ok(written)
 }
 
@@ -223,5 +232,6 @@ fn staged(path: &Path, bytes: &[u8]) -> Result<NamedTempFile, Failure> {
     }
     // The temporary file's random name would tell the user nothing: only the kind of the error is shown.
     let failed = |error: io::Error| format!("{}: {}", path.display(), error.kind());
+    remove_leftovers(folder);
     Ok(atomic_file::stage(path, bytes).map_err(failed)?)
 }

@@ -254,6 +254,11 @@ fn outcome(path: &Path, calibrate_only: bool, store: Option<&SessionStore>) -> (
     let found = catch_unwind(AssertUnwindSafe(|| session::analyse(path, calibrate_only))).unwrap_or_else(|_| {
         Err("an error of the program itself, which yair diagnose shows too; please report it".to_owned())
     });
+    // What is kept under a key is what was found in these bytes.
+    let found = found.and_then(|result| match store::key(path, calibrate_only) {
+        Ok(now) if now == key => Ok(result),
+        _ => Err(format!("{}: it was changed while it was read; call again when nobody writes there", path.display())),
+    });
     let outcome = match found {
         Ok(result) => match store.map_or(Ok(()), |store| store.write(&key, &result)) {
             Ok(()) => Outcome::Computed(Box::new(result)),

@@ -39,6 +39,8 @@ impl SessionStore {
         let folder = out.join("sessions");
         atomic_file::create_inside(out, Path::new("sessions"))
             .map_err(|error| format!("{}: {error}", folder.display()))?;
+        atomic_file::remove_leftovers(out);
+        atomic_file::remove_leftovers(&folder);
         Ok(Self { folder, out: out.to_owned(), lock })
     }
 

@@ -2,6 +2,7 @@
 //! can be simulated.
 
 use std::fs;
+use std::path::PathBuf;
 
 use scenario::Scenario;
 use sim_yair::SimulatedRobot;
@@ -71,6 +72,32 @@ fn the_repository_names_no_path_of_a_machine_and_no_registry() {
             content.lines().find(|line| line.starts_with("source = ") && line.contains("+") && !line.contains(index));
         assert!(other.is_none() || !file.ends_with("Cargo.lock"), "{}: {other:?}", file.display());
     }
+}
+
+/// How the time of day is read.
+const TIME_OF_DAY: [&str; 5] = ["SystemTime", "Timestamp::now", "Zoned::now", "clock_gettime", "Local::now"];
+
+/// A clock that jumps changes nothing: the time of day is read nowhere, and `Instant`, which does not jump,
+/// by files that show how long something took or write a state now and then.
+#[test]
+fn nothing_reads_the_time_of_day() {
+    let reads = |source: &str| TIME_OF_DAY.into_iter().find(|name| source.contains(name));
+    assert_eq!(reads("let now = jiff::Timestamp::now();"), Some("Timestamp::now"));
+    let mut with_instants = Vec::new();
+    let is_source = |file: &PathBuf| {
+        let is_test = file.components().any(|part| part.as_os_str() == "tests");
+        file.extension().is_some_and(|of| of == "rs") && !is_test
+    };
+    for file in files("src").into_iter().chain(files("crates")).filter(is_source) {
+        let source = text(&file);
+        assert_eq!(reads(&source), None, "{}", file.display());
+        if source.contains("Instant::now") {
+            with_instants.push(file.strip_prefix(root()).unwrap_or(&file).display().to_string());
+        }
+    }
+    with_instants.sort();
+    let known = ["crates/bench/src/sweep/campaign.rs", "src/challenge.rs", "src/reproduce.rs", "src/sparse_lines.rs"];
+    assert_eq!(with_instants, [&known[..], &["src/sweep.rs"]].concat());
 }
 
 #[test]

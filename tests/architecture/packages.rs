@@ -18,6 +18,20 @@ const README_LINES: std::ops::RangeInclusive<usize> = 10..=32;
 const MAX_KEYWORDS: usize = 5;
 const MAX_KEYWORD_LETTERS: usize = 20;
 
+/// What the manifest states is what README promises, and what CI compiles with: a newer compiler would accept
+/// what the stated one refuses.
+#[test]
+fn the_stated_version_of_rust_is_that_of_readme_and_of_ci() {
+    let manifest: toml::Table = text("Cargo.toml").parse().expect("TOML");
+    let stated = manifest["workspace"]["package"]["rust-version"].as_str().expect("a version").to_owned();
+    assert!(text("README.md").contains(&format!("needs Rust {stated} ")), "README.md does not say {stated}");
+    if std::env::var("CI").is_ok_and(|ci| ci == "true") {
+        let output = std::process::Command::new("rustc").arg("--version").output().expect("rustc runs");
+        let version = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(version.starts_with(&format!("rustc {stated}.")), "CI has {version}");
+    }
+}
+
 #[test]
 fn every_crate_says_what_it_is() {
     let readmes = text("src/readmes.rs");

@@ -59,7 +59,7 @@ fn a_calibration_gets_onto_a_robot_in_every_format() {
     };
     let faster = succeed(at, &["export", "ros2-yaml", "c.toml", "--speed", "0.5"]).stdout;
     assert_eq!((twist(&printed.stdout), twist(&faster)), (6.25e-6, 1.25e-5));
-    // A file is what is printed, and is replaced by --force alone.
+    // A file is what is printed, and is replaced where that is asked for.
     let to_file = |more: &[&'static str]| [&["export", "linorobot2", "c.toml", "--out", "lino.h"], more].concat();
     assert_eq!(succeed(at, &to_file(&[])).stdout, "linorobot2 in lino.h\n");
     let text = fs::read_to_string(at.join("lino.h")).expect("there");
@@ -67,6 +67,8 @@ fn a_calibration_gets_onto_a_robot_in_every_format() {
     // Counts of a turn from diameter and travel per tick of the file.
     assert_eq!(value(&text, "COUNTS_PER_REV1"), 9900.0);
     assert!(refusal(at, &to_file(&[])).starts_with("lino.h: already exists; nothing was written"));
+    assert!(refusal(at, &to_file(&["--without-effects"])).contains("give --replace"));
+    succeed(at, &to_file(&["--replace"]));
     succeed(at, &to_file(&["--force"]));
     for format in ["c", "mm", "roadrunner", "turtlebot3", "wpilib"] {
         let found = document(at, &["export", format, "c.toml"]);
@@ -119,7 +121,10 @@ fn an_extended_model_says_what_a_format_leaves_out() {
     assert!(ids("ros2-yaml").contains(&"slip_speed".to_owned()));
     let said = refusal(at, &["export", "ros2-yaml", "extended.toml"]);
     assert!(said.contains("slip_speed") && said.contains("calibration.toml"), "{said}");
-    let said = succeed(at, &["export", "ros2-yaml", "extended.toml", "--force"]);
+    // To replace a file is not to leave effects out.
+    assert_eq!(said, refusal(at, &["export", "ros2-yaml", "extended.toml", "--replace"]));
+    succeed(at, &["export", "ros2-yaml", "extended.toml", "--force"]);
+    let said = succeed(at, &["export", "ros2-yaml", "extended.toml", "--without-effects"]);
     assert!(said.stderr.contains("extended.toml: left out: slip_speed ("), "{}", said.stderr);
     assert!(said.stdout.contains("# Left out: slip_speed ("), "{}", said.stdout);
 }

@@ -52,24 +52,30 @@ fn is_being_written(here: &Path) -> bool {
     names.into_iter().any(|name| name.to_string_lossy().starts_with(".writing-"))
 }
 
+/// A table of a robot that drives straight on.
+pub(crate) fn long_table(rows: u32) -> String {
+    let mut table = "t,left_ticks,right_ticks,x,y,theta\n".to_owned();
+    for row in 0..rows {
+        let (t_s, ticks, x_m) = (0.02 * f64::from(row), 40 * row, 0.0046 * f64::from(row));
+        writeln!(table, "{t_s:.2},{ticks},{ticks},{x_m:.4},0,0").expect("a text");
+    }
+    table
+}
+
 #[test]
 fn an_import_that_is_interrupted_leaves_no_dataset() {
     let temp = tempfile::tempdir().expect("a folder");
     let here = temp.path();
     // So many rows that writing them takes tens of milliseconds.
-    let mut table = "t,left_ticks,right_ticks,x,y,theta\n".to_owned();
-    for row in 0..150_000_u32 {
-        let (t_s, ticks, x_m) = (0.02 * f64::from(row), 40 * row, 0.0046 * f64::from(row));
-        writeln!(table, "{t_s:.2},{ticks},{ticks},{x_m:.4},0,0").expect("a text");
-    }
-    fs::write(here.join("log.csv"), table).expect("written");
+    fs::write(here.join("log.csv"), long_table(150_000)).expect("written");
     let arguments = ["import", "csv", "log.csv", "--out", "new", "--wheel", "0.15", "--base", "0.3"];
     let arguments = [&arguments[..], &["--ticks-per-rev", "4096", "--time-unit", "s", "--angle-unit", "rad"]].concat();
     let ended = interrupted(here, &arguments, || is_being_written(here)).expect("it is seen at its work");
     is_of_the_signal(ended);
     assert!(!here.join("new").exists(), "{:?}", everything_in(here));
-    // What is left of it stops nobody.
+    // What is left of it stops nobody, and the next one takes it away.
     succeed(here, &arguments);
+    assert!(!is_being_written(here), "{:?}", everything_in(here));
     assert!(["dataset.toml", "odometry.csv", "truth.csv"].iter().all(|name| here.join("new").join(name).is_file()));
 }
 

@@ -1,5 +1,5 @@
 //! The command as a user runs it: what scripts rely on, bad input, sessions compared, poses corrected, files
-//! for robots, fleets, pages, campaigns that are stopped, and the gate on accuracy.
+//! for robots, fleets, pages, campaigns that are stopped, disturbances, and the gate on accuracy.
 
 mod accuracy_gate;
 mod bad_input;
@@ -9,6 +9,8 @@ mod compare;
 mod contract;
 mod correct;
 mod demo;
+#[cfg(unix)]
+mod disturbances;
 mod export;
 mod export_mcap;
 mod fleet;
@@ -18,6 +20,8 @@ mod import_ros2;
 mod import_tum;
 #[cfg(unix)]
 mod interrupt;
+#[cfg(unix)]
+mod kills;
 mod limits;
 mod pages;
 mod partial;

@@ -1,10 +1,14 @@
-//! Results written in one piece: a file is whole under its name, or it is not there; and files read up to a
-//! limit.
+//! Results written in one piece: a file or a folder is whole under its name, or it is not there; what a
+//! killed process leaves is taken away by the next; and files read up to a limit.
+
+mod leftovers;
+pub mod lock;
 
 use std::fs::File;
 use std::io::{self, Read, Write};
 use std::path::Path;
 
+pub use leftovers::{PREFIX, WorkFolder, remove_leftovers};
 use tempfile::NamedTempFile;
 
 /// A temporary file beside `path` that holds `bytes` and is to become `path` by `persist`. It has the
@@ -14,11 +18,7 @@ use tempfile::NamedTempFile;
 /// The system's, when the folder of `path` is not there or cannot be written.
 pub fn stage(path: &Path, bytes: &[u8]) -> io::Result<NamedTempFile> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    // As readable as any other file of the user; temporary files are private.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(folder)?;
+    let mut file = leftovers::locked_file(folder)?;
     file.write_all(bytes)?;
     Ok(file)
 }

@@ -7,6 +7,7 @@
 
 mod alignment;
 mod compare;
+mod conditioning;
 mod dead_reckoning_jacobian;
 mod drift;
 mod drive;

@@ -141,6 +141,10 @@ pub(crate) const DISPLACEMENT_DISTANCE_M: f64 = 1.5;
 /// Tuned: by hand; no record of what on.
 pub(crate) const DISPLACEMENT_TURN_RAD: f64 = 3.0 * FRAC_PI_2;
 
+/// Condition of normal equations, with their diagonal scaled to one, beyond which nothing is solved.
+/// Derived: roundings of 1e-16 leave four digits of the solution.
+pub(crate) const MAX_NORMAL_CONDITION: f64 = 1e12;
+
 /// Ratio of the extreme eigenvalues of Σ Φ Φᵀ beyond which the wheels' turns are of one proportion.
 /// Published: Censi, Franchi, Marchionni & Oriolo 2013, their program's "not very exciting data".
 pub(crate) const MAX_TURN_CONDITION: f64 = 75.0;

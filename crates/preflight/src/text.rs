@@ -112,22 +112,22 @@ pub(crate) fn sentence(kind: &Kind, runs: Option<&[String]>) -> String {
             };
             match unit {
                 Some(unit) => format!("{what} in {unit} instead of metres; divide them by {how:.4}"),
-                None => format!("{what} {how:.3} times what the rest of the dataset says; check the unit"),
+                None => format!("{what} {} what the rest of the dataset says; check the unit", times(how)),
             }
         }
         Kind::TicksPerTurn { ratio, stated, simple } => {
-            let found = stated.map(|stated| stated / ratio);
-            let value = found.map_or_else(String::new, |found| format!(": near {found:.0}"));
+            let value = ticks_per_rev(*stated, *ratio).map_or_else(String::new, |found| format!(": near {found:.0}"));
             let cause = match (*simple, stated.is_some()) {
                 (true, true) => "ticks_per_rev is wrong by a simple factor, or a radius is stated for a diameter",
                 (true, false) => "a radius is stated for a diameter, or the other way round; or the wheels turn by a gear",
                 (false, true) => "check ticks_per_rev and the wheels' diameters",
                 (false, false) => "check the wheels' diameters",
             };
-            format!("both wheels are {ratio:.3} times as large as stated; {cause}{value}")
+            format!("both wheels are {} as large as stated; {cause}{value}", times(*ratio))
         }
         Kind::OtherRobot { parameter, ratio } => {
-            format!("{parameter} is {ratio:.3} times what dataset.toml states; correct it, or check the log's columns")
+            let times = times(*ratio);
+            format!("{parameter} is {times} what dataset.toml states; correct it, or check the log's columns")
         }
         Kind::SeveralRobots { parameter, sessions, values_m } => format!(
             "the sessions are of different robots: {parameter} is {:.2} mm in {} and {:.2} mm in {}; calibrate them apart",
@@ -191,6 +191,21 @@ pub(crate) fn sentence(kind: &Kind, runs: Option<&[String]>) -> String {
     format!("{place}{what}")
 }
 
+/// A ratio as people read it. What is beyond all numbers, or below, has a bound.
+fn times(ratio: f64) -> String {
+    match ratio.abs() {
+        size if size >= f64::MAX => "more than 1e308 times".to_owned(),
+        size if size < f64::MIN_POSITIVE => "less than 1e-307 times".to_owned(),
+        1e-2..1e5 => format!("{ratio:.3} times"),
+        _ => format!("{ratio:.2e} times"),
+    }
+}
+
+/// Counts a revolution that would mend a ratio; `None` where none would.
+fn ticks_per_rev(stated: Option<f64>, ratio: f64) -> Option<f64> {
+    stated.map(|stated| (stated / ratio).round()).filter(|ticks| (1.0..f64::MAX).contains(ticks))
+}
+
 /// At most so many runs are named one by one.
 fn place(runs: Option<&[String]>) -> String {
     match runs {
@@ -228,12 +243,40 @@ pub(crate) fn fix(kind: &Kind) -> Option<String> {
         Kind::LengthUnit { ratio, of_truth: true, unit: Some(_) } => {
             corrections(format!("truth_length_factor = {}", 1.0 / ratio))
         }
-        Kind::TicksPerTurn { ratio, stated: Some(stated), .. } => {
-            Some(format!("[robot] ticks_per_rev = {:.0}", stated / ratio))
+        Kind::TicksPerTurn { ratio, stated, .. } => {
+            ticks_per_rev(*stated, *ratio).map(|ticks| format!("[robot] ticks_per_rev = {ticks:.0}"))
         }
         Kind::InstantRates => corrections("instant_rates = true".to_owned()),
         Kind::Gap { .. } => Some("[[run]] continuous = false".to_owned()),
         Kind::SeveralRobots { .. } => Some("--force".to_owned()),
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ratio_of_absurd_units_has_a_number_or_a_bound() {
+        let shown = [1.015, 0.5, 12345.0, 1e9, 1e-9, f64::INFINITY, 0.0].map(times);
+        let expected = ["1.015", "0.500", "12345.000", "1.00e9", "1.00e-9", "more than 1e308", "less than 1e-307"];
+        assert_eq!(shown, expected.map(|number| format!("{number} times")));
+        // Found by fuzzing: truth in units of 1e300 m made of a wheel "inf times what dataset.toml states".
+        for ratio in [f64::INFINITY, 1e300, 0.0, 1e-300] {
+            let kinds = [
+                Kind::OtherRobot { parameter: "left_wheel_diameter_m", ratio },
+                Kind::LengthUnit { ratio, unit: None, of_truth: true },
+                Kind::LengthUnit { ratio, unit: None, of_truth: false },
+                Kind::TicksPerTurn { ratio, stated: Some(4096.0), simple: false },
+            ];
+            for kind in kinds {
+                let said = format!("{} {}", sentence(&kind, None), fix(&kind).unwrap_or_default());
+                let has = |word: &str| said.split(|letter: char| !letter.is_alphanumeric()).any(|of| of == word);
+                assert!(!has("inf") && !has("NaN") && !said.contains("ticks_per_rev = 0"), "{said}");
+            }
+        }
+        let kind = Kind::TicksPerTurn { ratio: 2.0, stated: Some(4096.0), simple: true };
+        assert_eq!(fix(&kind).as_deref(), Some("[robot] ticks_per_rev = 2048"));
     }
 }

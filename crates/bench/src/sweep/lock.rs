@@ -4,9 +4,11 @@
 //! lock is the operating system's, on a file in the folder: a process that is killed leaves the file and
 //! loses the lock.
 
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::{File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
+
+use atomic_file::lock::{is_still_at, keeps_others_out, opened};
 
 use crate::error::BenchError;
 
@@ -43,7 +45,7 @@ impl FolderLock {
             match file.try_lock() {
                 Ok(()) if !is_still_at(&file, &path) => {}
                 Ok(()) => {
-                    let why_not_held = why_not_held(&path);
+                    let why_not_held = keeps_others_out(&path).err().map(|error| error.to_string());
                     return Ok(Self { file: Some(file), path, why_not_held });
                 }
                 Err(TryLockError::WouldBlock) => return Err(in_use()),
@@ -73,41 +75,6 @@ impl Drop for FolderLock {
     }
 }
 
-fn opened(path: &Path) -> io::Result<File> {
-    if path.is_symlink() {
-        return Err(io::Error::new(io::ErrorKind::AlreadyExists, "the lock is a link"));
-    }
-    // For writing, as network file systems ask of who locks.
-    OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path)
-}
-
-/// A lock that a second handle of the same file gets too keeps nobody out.
-fn why_not_held(path: &Path) -> Option<String> {
-    let second = opened(path).and_then(|second| match second.try_lock() {
-        Err(TryLockError::WouldBlock) => Ok(()),
-        Ok(()) => Err(io::Error::other("a second lock of the same file is granted")),
-        Err(TryLockError::Error(error)) => Err(error),
-    });
-    second.err().map(|error| error.to_string())
-}
-
-/// Whether the file at the path is the one that was opened.
-#[cfg(unix)]
-fn is_still_at(file: &File, path: &Path) -> bool {
-    use std::os::unix::fs::MetadataExt;
-    let id = |metadata: std::fs::Metadata| (metadata.dev(), metadata.ino());
-    match (file.metadata(), std::fs::metadata(path)) {
-        (Ok(ours), Ok(there)) => id(ours) == id(there),
-        _ => false,
-    }
-}
-
-/// Nobody takes the file away.
-#[cfg(not(unix))]
-fn is_still_at(_: &File, _: &Path) -> bool {
-    true
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -125,18 +92,5 @@ mod tests {
         // What a killed process leaves is no lock.
         std::fs::write(folder.join(LOCK_FILE), "").expect("written");
         drop(FolderLock::take(&folder).expect("nobody has it"));
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn a_lock_on_a_file_that_was_taken_away_is_none() {
-        let temporary = tempfile::tempdir().expect("a folder");
-        let path = temporary.path().join(LOCK_FILE);
-        let before = opened(&path).expect("made");
-        assert!(is_still_at(&before, &path));
-        std::fs::remove_file(&path).expect("there");
-        assert!(!is_still_at(&before, &path));
-        let after = opened(&path).expect("made");
-        assert!(!is_still_at(&before, &path) && is_still_at(&after, &path));
     }
 }

@@ -30,6 +30,14 @@ impl Spool {
         let path = folder.join(SPOOL_FILE);
         let open = || {
             let mut file = OpenOptions::new().create(true).truncate(keep == 0).write(true).open(&path)?;
+            let length = file.metadata()?.len();
+            if length < keep {
+                // Filled up it would hold estimates of 0 that no method gave.
+                let why = format!(
+                    "it has {length} bytes and the state beside it counts {keep}; delete the folder and sweep anew"
+                );
+                return Err(std::io::Error::other(why));
+            }
             if keep > 0 {
                 file.set_len(keep)?;
             }
@@ -59,4 +67,22 @@ impl Spool {
 /// The spool in a folder.
 pub(super) fn spool_in(folder: &Path) -> PathBuf {
     folder.join(SPOOL_FILE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_spool_is_cut_back_to_its_state_and_never_filled_up() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut spool = Spool::open(folder.path(), 0).expect("made");
+        let written = spool.append(&[Outcome { value: 1.0, sigma: 2.0, blind: false }; 3]).expect("appended");
+        spool.flush().expect("flushed");
+        drop(spool);
+        drop(Spool::open(folder.path(), written - 16).expect("cut back"));
+        assert_eq!(std::fs::metadata(spool_in(folder.path())).expect("there").len(), written - 16);
+        let refused = Spool::open(folder.path(), written).err().expect("shorter than its state says").to_string();
+        assert!(refused.contains("it has 32 bytes and the state beside it counts 48"), "{refused}");
+    }
 }

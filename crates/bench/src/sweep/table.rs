@@ -71,6 +71,7 @@ pub fn can_be_written(dir: &Path, rows: bool) -> Result<(), BenchError> {
     }
     let probe = || {
         std::fs::create_dir_all(dir)?;
+        atomic_file::remove_leftovers(dir);
         atomic_file::stage(&dir.join("sweep.json"), b"").map(drop)
     };
     probe().map_err(|error: std::io::Error| failed(dir, &format!("cannot write results there: {}", error.kind())))

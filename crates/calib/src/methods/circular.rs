@@ -22,6 +22,7 @@ use motion_programs::Schedule;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
 use super::linear::scatter_between_runs;
+use crate::conditioning::well_conditioned;
 use crate::estimate::{
     CalibError, Calibration, Covariance, Method, NotObservable, Parameter, Rejected, drive, nominal,
 };
@@ -183,7 +184,11 @@ impl Method for Circular {
                 why: "in one direction, unequal wheels and a wrong wheelbase bend a circle alike; drive the same circles in the other direction too".to_owned(),
             });
         }
-        let fit = Fit::of(&runs, geometry.wheel_separation_m());
+        let start = Fit::start(geometry.wheel_separation_m());
+        let missing = "its circles do not tell unequal wheels from a wrong wheelbase: drive smaller ones both ways round";
+        let normal = DMatrix::from_column_slice(2, 2, start.normal(&runs).0.as_slice());
+        well_conditioned(Self::NAME, Parameter::WheelSeparation, &normal, missing)?;
+        let fit = start.minimised(&runs);
         let mean_m = 0.5 * (geometry.wheel_diameter_m().left + geometry.wheel_diameter_m().right);
         let Fit { ratio, separation_m, .. } = fit;
         let diameter_m = Wheels { left: 2.0 * mean_m / (ratio + 1.0), right: 2.0 * mean_m * ratio / (ratio + 1.0) };
@@ -215,8 +220,13 @@ struct Fit {
 }
 
 impl Fit {
-    fn of(runs: &[Vec<Arc>], nominal_separation_m: f64) -> Self {
-        let mut fit = Self { ratio: 1.0, separation_m: nominal_separation_m, settled: false };
+    fn start(nominal_separation_m: f64) -> Self {
+        Self { ratio: 1.0, separation_m: nominal_separation_m, settled: false }
+    }
+
+    /// The minimum, from here.
+    fn minimised(self, runs: &[Vec<Arc>]) -> Self {
+        let mut fit = self;
         for _ in 0..CIRCULAR_MAX_STEPS {
             let (normal, right) = fit.normal(runs);
             let Some(step) = normal.try_inverse().map(|inverse| inverse * right) else { break };
@@ -282,7 +292,7 @@ mod tests {
         let runs = [vec![arc(1.0, ratio, base_m); 3], vec![arc(-1.0, ratio, base_m); 2]];
         let several = [vec![arc(1.0, ratio, base_m), arc(0.5, ratio, base_m)], vec![arc(-0.7, ratio, base_m)]];
         for runs in [&runs, &several] {
-            let fit = Fit::of(runs, 0.3);
+            let fit = Fit::start(0.3).minimised(runs);
             assert!(fit.settled);
             assert!((fit.ratio - ratio).abs() < 1e-12 && (fit.separation_m - base_m).abs() < 1e-12);
         }

@@ -21,6 +21,7 @@ use motion_programs::Schedule;
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Vector2};
 
 use super::linear::scatter_between_runs;
+use crate::conditioning::well_conditioned;
 use crate::dead_reckoning_jacobian::{DeadReckoned, GeometryParameters};
 use crate::estimate::{CalibError, Calibration, Covariance, Method, Parameter, drive, nominal};
 use crate::pose_measurements::{PoseMeasurement, PoseMeasurements, Spacing};
@@ -222,6 +223,11 @@ impl Method for Ivanjko {
                     .to_owned(),
             });
         }
+        let by_radii = straights.iter().map(|straight| straight.missing(&at).1);
+        let normal: Matrix2<f64> = by_radii.map(|slopes| slopes.transpose() * slopes).sum();
+        let missing = "its straight runs do not tell one wheel from the other: drive them longer";
+        let normal = DMatrix::from_column_slice(2, 2, normal.as_slice());
+        well_conditioned(Self::NAME, Parameter::LeftWheelDiameter, &normal, missing)?;
         let (mut converged, mut last) = (false, None);
         for _ in 0..IVANJKO_MAX_ROUNDS {
             let Some(step) = Step1::of(&straights, &at) else { break };

@@ -13,8 +13,8 @@ use std::io::{self, BufWriter, Write};
 use std::mem::{Discriminant, discriminant};
 use std::path::{Path, PathBuf};
 
+use atomic_file::WorkFolder;
 use tables::{OptionalColumns, Out, TABLES};
-use tempfile::TempDir;
 
 use crate::error::{DatasetError, shown};
 use crate::read::{DISPLACEMENT, DISTANCE, GYRO, MANIFEST, ODOMETRY, POINTS, REVISIT, TRUTH, WALL, WHEEL_REFERENCE};
@@ -70,7 +70,7 @@ pub struct Writer {
     columns: OptionalColumns,
     target: PathBuf,
     existing: Existing,
-    workshop: TempDir,
+    work: WorkFolder,
     infos: Vec<RunInfo>,
     ids: BTreeSet<String>,
     /// The form in which the first run reports its wheels.
@@ -104,16 +104,10 @@ impl Writer {
             _ => Path::new("."),
         };
         fs::create_dir_all(parent).map_err(|source| io_error(parent, source))?;
-        // The folder that tempfile makes is private to the user; the dataset inside gets the usual
-        // permissions.
-        let workshop = tempfile::Builder::new()
-            .prefix(".writing-")
-            .tempdir_in(parent)
-            .map_err(|source| io_error(parent, source))?;
-        let made = workshop.path().join(MADE);
-        fs::create_dir(&made).map_err(|source| io_error(&made, source))?;
+        // The name of the folder under way would tell the user nothing: only the kind of the error is shown.
+        let work = WorkFolder::beside(parent).map_err(|source| io_error(&target, io::Error::from(source.kind())))?;
         let (infos, ids, tables) = (Vec::new(), BTreeSet::new(), Default::default());
-        Ok(Self { header, columns, target, existing, workshop, infos, ids, form: None, tables })
+        Ok(Self { header, columns, target, existing, work, infos, ids, form: None, tables })
     }
 
     /// Adds a run.
@@ -127,7 +121,7 @@ impl Writer {
             let what = "optional columns that the dataset's tables were begun without".to_owned();
             return Err(DatasetError::RunNotWritable { run: shown(run.info.id.as_bytes()), what });
         }
-        let made = self.workshop.path().join(MADE);
+        let made = self.work.made();
         for (kind, out) in TABLES.iter().zip(&mut self.tables) {
             if !(kind.has)(run) {
                 continue;
@@ -141,7 +135,7 @@ impl Writer {
                 }
                 out.as_mut().map_or(Ok(()), |out| (kind.rows)(run, &self.header.points, columns, out))
             };
-            rows().map_err(|source| io_error(&file, source))?;
+            rows().map_err(|source| io_error(&self.target.join(kind.file), source))?;
         }
         self.infos.push(run.info.clone());
         Ok(())
@@ -163,28 +157,19 @@ impl Writer {
             );
             return Err(not_writable(what));
         }
-        let (made, target) = (self.workshop.path().join(MADE), &self.target);
+        let (made, target) = (self.work.made(), &self.target);
         let file = made.join(MANIFEST);
-        fs::write(&file, toml).map_err(|source| io_error(&file, source))?;
+        fs::write(&file, toml).map_err(|source| io_error(&target.join(MANIFEST), source))?;
         for (kind, out) in TABLES.iter().zip(self.tables) {
-            out.map_or(Ok(()), |mut out| out.flush()).map_err(|source| io_error(&made.join(kind.file), source))?;
+            out.map_or(Ok(()), |mut out| out.flush()).map_err(|source| io_error(&target.join(kind.file), source))?;
         }
         // Asked again: while the runs were written someone else may have come.
         if !may_write(target, self.existing)? {
-            return fs::rename(&made, target).map_err(|source| io_error(target, source));
+            return self.work.rename_to(target).map_err(|source| io_error(target, source));
         }
-        let old = self.workshop.path().join("replaced");
-        fs::rename(target, &old).map_err(|source| io_error(target, source))?;
-        fs::rename(&made, target).map_err(|source| {
-            // Back as it was; when not even that works, the first reason is still the one to tell.
-            let _ = fs::rename(&old, target);
-            io_error(target, source)
-        })
+        self.work.replace(target).map_err(|source| io_error(target, source))
     }
 }
-
-/// The dataset inside of the temporary folder.
-const MADE: &str = "made";
 
 fn io_error(path: &Path, source: io::Error) -> DatasetError {
     DatasetError::Io { path: path.to_owned(), source }

@@ -100,7 +100,8 @@ fn scale(check: &SessionCheck, wheels: Wheels<f64>, separation: Option<f64>, sig
         right: is_off(wheels.right, MAX_WHEEL_RATIO, sigma[1]),
     };
     let near = |a: f64, b: f64| (a / b).ln().abs() < FACTOR_TOLERANCE;
-    let mean = (wheels.left * wheels.right).sqrt();
+    // The product of two that are large has no number.
+    let mean = wheels.left.sqrt() * wheels.right.sqrt();
     if off.left && off.right && near(wheels.left, wheels.right) {
         if separation.is_some_and(|separation| near(separation, mean))
             || (separation.is_none() && !(0.05..20.0).contains(&mean))
