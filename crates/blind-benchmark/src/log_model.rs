@@ -3,7 +3,7 @@
 //! The counters go on over a lost row; rows that are lost with their counts are the effect
 //! `dropped_samples`. Rows are stamped in their order: one that is received late holds up those behind it.
 
-use dataset::{Run, WheelLog};
+use dataset::Run;
 
 use super::conditions::{Conditions, Stamps};
 use super::draw::Draw;
@@ -43,22 +43,12 @@ fn stamp(run: &mut Run, mut late_s: impl FnMut() -> f64) {
 fn lose_rows(run: &mut Run, mut is_lost: impl FnMut(usize) -> bool) {
     let rows = run.odometry.t_s.len();
     let keep: Vec<bool> = (0..rows).map(|row| row == 0 || row + 1 == rows || !is_lost(row)).collect();
-    let retain = |place: &mut usize| {
-        *place += 1;
-        keep[*place - 1]
-    };
-    let mut place = 0;
-    run.odometry.t_s.retain(|_| retain(&mut place));
-    if let WheelLog::Ticks(ticks) = &mut run.odometry.wheels {
-        for column in [&mut ticks.left, &mut ticks.right] {
-            let mut place = 0;
-            column.retain(|_| retain(&mut place));
-        }
-    }
+    run.odometry.retain_rows(&keep);
 }
 
 #[cfg(test)]
 mod tests {
+    use dataset::WheelLog;
     use kinematics::Wheels;
 
     use super::*;

@@ -77,6 +77,8 @@ pub struct Diagnosis {
     pub alternatives: Vec<Alternative>,
     /// The calibration without what was found; gains are over it.
     pub base: CalibrationReport,
+    /// The calibrated model without what was found.
+    pub calibrated: FittedModel,
     /// The calibrated model with what was found in its mean.
     pub found: FittedModel,
     /// The geometry that suits these data best where none of the robot's own effects can be expressed: fitted
@@ -237,7 +239,8 @@ fn stages(datasets: &[Dataset], options: &Options, min_common_clock_s: f64) -> R
         dataset: Names::of(names.clone()),
         methods: vec![MethodReport::new("joint", &calibration(records, model), &records[0].robot)],
     };
-    let base = calibration_of(&AugmentedModel::base(&structure.base));
+    let calibrated = AugmentedModel::base(&structure.base);
+    let (base, calibrated) = (calibration_of(&calibrated), FittedModel::of(&calibrated));
     let of_instrument = with_candidates(&structure.base, model, |_, candidate| candidate.is_of_instrument());
     let geometry_alone = faults.is_empty().then(|| calibration_of(&of_instrument));
     let document = Document {
@@ -259,7 +262,7 @@ fn stages(datasets: &[Dataset], options: &Options, min_common_clock_s: f64) -> R
         extended_model_why_null: extended.as_ref().err().cloned(),
     };
     let found = FittedModel::of(model);
-    Ok(Diagnosis { document, extended, residuals, alternatives, base, found, geometry_alone })
+    Ok(Diagnosis { document, extended, residuals, alternatives, base, calibrated, found, geometry_alone })
 }
 
 /// The base fit, of thinned measurements where odometry seems uncorrelated with all of them: between frequent

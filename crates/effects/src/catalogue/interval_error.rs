@@ -130,29 +130,36 @@ fn restamped(dataset: &Dataset, share: f64, sigma: f64) -> Option<Dataset> {
         if matches!(run.odometry.wheels, WheelLog::Twist { .. }) || !run.info.continuous {
             continue;
         }
-        if let Some(read_s) = read_times(&run.odometry.t_s, share, sigma) {
+        if let Some((read_s, has_tick)) = read_times(&run.odometry.t_s, share, sigma) {
             run.odometry.t_s = read_s;
+            run.odometry.retain_rows(&has_tick);
             has_beat = true;
         }
     }
     has_beat.then_some(records)
 }
 
-/// When rows were read that have these stamps: nearer to the beat by the false share.
-fn read_times(stamps_s: &[f64], share: f64, sigma: f64) -> Option<Vec<f64>> {
+/// When rows were read that have these stamps: nearer to the beat by the false share; and for each row whether
+/// it alone is of its tick. Of two rows of one tick, one came by itself: stamps do not say which, nor when.
+fn read_times(stamps_s: &[f64], share: f64, sigma: f64) -> Option<(Vec<f64>, Vec<bool>)> {
     if share <= 0.0 {
         return None;
     }
     let share = if (share - 1.0).abs() <= WHOLE_SHARE_SIGMAS * sigma { 1.0 } else { share.min(1.0) };
     let period = SamplingPeriod::of(stamps_s)?;
-    // Two rows of one tick, of which one came by itself, keep their order.
+    // Rows keep their order.
     let least_s = MIN_GAP * period.period_s;
     let mut before_s = f64::NEG_INFINITY;
     let read = |(stamp_s, late_s): (&f64, &f64)| {
         before_s = f64::max(before_s + least_s, stamp_s - share * late_s);
         before_s
     };
-    Some(stamps_s.iter().zip(&period.late_s).map(read).collect())
+    let read_s = stamps_s.iter().zip(&period.late_s).map(read).collect();
+    // The ends of a run stay: what was measured there is compared with them.
+    let last = period.numbers.len() - 1;
+    let differs = |from: usize, to: usize| period.numbers[from] != period.numbers[to];
+    let has_tick = |row: usize| row == 0 || row == last || (differs(row - 1, row) && differs(row, row + 1));
+    Some((read_s, (0..=last).map(has_tick).collect()))
 }
 
 struct State {
@@ -242,11 +249,12 @@ mod tests {
         };
         // The line through 501 rows is off by 1 ms/√501 on average, by twice that at the ends of a run.
         // Rejects the stamps as they are, 1 ms off.
-        let whole = read_times(&stamped(1.0), 0.96, 0.02).expect("a beat");
+        let (whole, _) = read_times(&stamped(1.0), 0.96, 0.02).expect("a beat");
         assert!(off_s(&whole, 0.0) < 1e-4, "{}", off_s(&whole, 0.0));
         // A share that is surely half leaves the other half, which is true.
-        let half = read_times(&stamped(1.0), 0.5, 0.02).expect("a beat");
+        let (half, has_tick) = read_times(&stamped(1.0), 0.5, 0.02).expect("a beat");
         assert!(off_s(&half, 0.5) < 1e-4, "{}", off_s(&half, 0.5));
+        assert!(has_tick.iter().all(|has_tick| *has_tick), "each row has its tick");
         assert!(read_times(&stamped(1.0), -0.9, 0.02).is_none(), "speeds that were logged have true stamps");
     }
 }
