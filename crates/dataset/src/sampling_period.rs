@@ -18,9 +18,10 @@ const ROUNDS: usize = 5;
 /// Share of the beat by which gaps that are whole numbers of it depart at the most.
 const MAX_WHOLE_GAP_ERROR: f64 = 0.05;
 /// Spans of so many rows whose phases say the beat, within these shares of what was known before, and in how
-/// many steps: a fifth of the rows may be lost at first; then three times what a span before leaves open.
+/// many steps: a fifth of the rows may be lost at first, or have come by themselves; then three times what a span
+/// before leaves open.
 const PHASE_SPANS: [(usize, [f64; 2], u32); 4] =
-    [(2, [0.8, 1.02], 44), (8, [0.97, 1.03], 24), (23, [0.99, 1.01], 20), (100, [0.9975, 1.0025], 20)];
+    [(2, [0.8, 1.2], 80), (8, [0.97, 1.03], 24), (23, [0.99, 1.01], 20), (100, [0.9975, 1.0025], 20)];
 /// A run has as many spans one after the other at the least, so that a beat that begins anew spoils few.
 const SPANS: usize = 8;
 /// Spans of which phases are taken.
@@ -44,6 +45,8 @@ const HUBER_SIGMAS: f64 = 1.5;
 /// this share of the gaps is such.
 const BUNCHED_GAP: f64 = 0.2;
 const MIN_BUNCHED_SHARE: f64 = 0.1;
+/// Where stamps are later than that share of the beat, root mean square, some numbers of rows are wrong.
+const MAX_CERTAIN_LATENESS: f64 = 0.25;
 /// Share of the beat by which stamps are held to jitter at the least: what rounded file formats leave.
 const MIN_JITTER: f64 = 0.02;
 
@@ -77,6 +80,13 @@ impl SamplingPeriod {
         };
         let late_s = lateness(t_s, &numbers, period_s);
         Some(Self { period_s, numbers, late_s })
+    }
+
+    /// Whether stamps are near enough to the beat that the numbers of all rows are right.
+    #[must_use]
+    pub fn is_certain(&self) -> bool {
+        let square_s2 = self.late_s.iter().map(|late_s| late_s * late_s).sum::<f64>() / self.late_s.len() as f64;
+        square_s2.sqrt() <= MAX_CERTAIN_LATENESS * self.period_s
     }
 
     /// Ticks from a row to the next one: 2 where one row is missing between them.
@@ -253,20 +263,25 @@ fn likeliest_numbers(t_s: &[f64], period_s: f64) -> (Vec<i64>, f64) {
     (numbers, cost + t_s.len() as f64 * (jitter * period_s).ln())
 }
 
-/// How late each stamp is against the line through the rows around it.
+/// How late each stamp is against the line through the rows around it that are alone of their ticks: one that
+/// came by itself is on no line. Through all of them where hardly any is alone.
 fn lateness(t_s: &[f64], numbers: &[i64], period_s: f64) -> Vec<f64> {
     let rows = t_s.len();
     // Sums of a window slide along; times over numbers stay small for precision.
     let mut sums = Sums::default();
     let (mut from, mut to) = (0, 0);
     let point = |row: usize| (numbers[row] as f64, t_s[row] - period_s * numbers[row] as f64);
+    let differs = |row: usize, next: usize| next == rows || numbers[row] != numbers[next];
+    let is_alone = |row: usize| (row == 0 || differs(row - 1, row)) && differs(row, row + 1);
+    let most_are = (0..rows).filter(|row| is_alone(*row)).count() * 2 > rows;
+    let weight = |row: usize| if is_alone(row) || !most_are { 1.0 } else { 0.0 };
     let late = |row: usize| {
         while to < rows.min(row + LINE_ROWS + 1) {
-            sums.add(point(to), 1.0);
+            sums.add(point(to), weight(to));
             to += 1;
         }
         while from + LINE_ROWS < row {
-            sums.add(point(from), -1.0);
+            sums.add(point(from), -weight(from));
             from += 1;
         }
         let (number, rest_s) = point(row);

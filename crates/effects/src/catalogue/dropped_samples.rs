@@ -97,9 +97,6 @@ const GAP_RATIO: f64 = 1.5;
 const MIN_MISSED_COUNTS: f64 = 6.0;
 /// Rows to either side of a gap that say how fast the wheels turned: their rounding is a third of a row's.
 const ROWS_AROUND: usize = 3;
-/// Where stamps are later than that share of the beat, root mean square, some numbers of rows are wrong, and
-/// the log alone shows nothing.
-const MAX_LATE_SHARE: f64 = 0.25;
 /// With so many gaps that lost counts, and as few that did not, the log itself shows the fault.
 const MIN_VISIBLE_FAULTS: usize = 3;
 /// Share of the pairs of successive measurements that gaps may spoil for the rest to be enough.
@@ -121,8 +118,8 @@ struct Missing {
 /// may jitter, and whether that is uncertain; by time where there is none. One that came by itself is none.
 fn rows_after(t_s: &[f64]) -> Option<(Vec<f64>, bool)> {
     if let Some(period) = SamplingPeriod::of(t_s) {
-        let square_s2 = period.late_s.iter().map(|late_s| late_s * late_s).sum::<f64>() / t_s.len() as f64;
-        let uncertain = square_s2.sqrt() > MAX_LATE_SHARE * period.period_s;
+        // Where some numbers of rows are wrong, the log alone shows nothing.
+        let uncertain = !period.is_certain();
         return Some((period.numbers.windows(2).map(|pair| (pair[1] - pair[0]) as f64).collect(), uncertain));
     }
     let lengths_s: Vec<f64> = t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();

@@ -130,23 +130,41 @@ fn restamped(dataset: &Dataset, share: f64, sigma: f64) -> Option<Dataset> {
         if matches!(run.odometry.wheels, WheelLog::Twist { .. }) || !run.info.continuous {
             continue;
         }
-        if let Some((read_s, has_tick)) = read_times(&run.odometry.t_s, share, sigma) {
+        if let Some((read_s, says)) = read_times(&run.odometry.t_s, share, sigma) {
             run.odometry.t_s = read_s;
-            run.odometry.retain_rows(&has_tick);
+            run.odometry.retain_rows(&says);
             has_beat = true;
         }
     }
     has_beat.then_some(records)
 }
 
-/// When rows were read that have these stamps: nearer to the beat by the false share; and for each row whether
-/// it alone is of its tick. Of two rows of one tick, one came by itself: stamps do not say which, nor when.
+/// When rows were read that have these stamps, and which rows say when. A row of a tick was read nearer to the
+/// beat by the false share. Of several rows of one tick the nearest is the tick's; the others came by themselves,
+/// with no beat to say when but their stamps. Where stamps are later than a tick can be told by, none of them
+/// says when.
 fn read_times(stamps_s: &[f64], share: f64, sigma: f64) -> Option<(Vec<f64>, Vec<bool>)> {
     if share <= 0.0 {
         return None;
     }
     let share = if (share - 1.0).abs() <= WHOLE_SHARE_SIGMAS * sigma { 1.0 } else { share.min(1.0) };
     let period = SamplingPeriod::of(stamps_s)?;
+    let (mut late_s, mut says) = (period.late_s.clone(), vec![true; stamps_s.len()]);
+    let mut first = 0;
+    for of_tick in period.numbers.chunk_by(|number, next| number == next) {
+        let rows = first..first + of_tick.len();
+        first = rows.end;
+        let nearest = rows.clone().min_by(|a, b| late_s[*a].abs().total_cmp(&late_s[*b].abs()));
+        for row in rows.clone().filter(|row| Some(*row) != nearest) {
+            late_s[row] = 0.0;
+        }
+        if rows.len() > 1 && !period.is_certain() {
+            says[rows].fill(false);
+        }
+    }
+    // The ends of a run stay: what was measured there is compared with them.
+    let last = says.len() - 1;
+    (says[0], says[last]) = (true, true);
     // Rows keep their order.
     let least_s = MIN_GAP * period.period_s;
     let mut before_s = f64::NEG_INFINITY;
@@ -154,12 +172,7 @@ fn read_times(stamps_s: &[f64], share: f64, sigma: f64) -> Option<(Vec<f64>, Vec
         before_s = f64::max(before_s + least_s, stamp_s - share * late_s);
         before_s
     };
-    let read_s = stamps_s.iter().zip(&period.late_s).map(read).collect();
-    // The ends of a run stay: what was measured there is compared with them.
-    let last = period.numbers.len() - 1;
-    let differs = |from: usize, to: usize| period.numbers[from] != period.numbers[to];
-    let has_tick = |row: usize| row == 0 || row == last || (differs(row - 1, row) && differs(row, row + 1));
-    Some((read_s, (0..=last).map(has_tick).collect()))
+    Some((stamps_s.iter().zip(&late_s).map(read).collect(), says))
 }
 
 struct State {
@@ -252,9 +265,9 @@ mod tests {
         let (whole, _) = read_times(&stamped(1.0), 0.96, 0.02).expect("a beat");
         assert!(off_s(&whole, 0.0) < 1e-4, "{}", off_s(&whole, 0.0));
         // A share that is surely half leaves the other half, which is true.
-        let (half, has_tick) = read_times(&stamped(1.0), 0.5, 0.02).expect("a beat");
+        let (half, says) = read_times(&stamped(1.0), 0.5, 0.02).expect("a beat");
         assert!(off_s(&half, 0.5) < 1e-4, "{}", off_s(&half, 0.5));
-        assert!(has_tick.iter().all(|has_tick| *has_tick), "each row has its tick");
+        assert!(says.iter().all(|says| *says), "each row has its tick");
         assert!(read_times(&stamped(1.0), -0.9, 0.02).is_none(), "speeds that were logged have true stamps");
     }
 }
