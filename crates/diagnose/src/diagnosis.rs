@@ -182,7 +182,8 @@ fn stages(datasets: &[Dataset], options: &Options, min_common_clock_s: f64) -> R
     };
     let is_open = |candidate: &Candidate| stamps.is_none_or(|error| error.candidate.id() != candidate.id());
     let mut catalogue: Vec<Candidate> = every_term.into_iter().filter(is_open).collect();
-    let restored = faults.iter().any(|fault| fault.is_restored_roughly());
+    let restored =
+        faults.iter().any(|fault| fault.is_restored_roughly()) || stamps.is_some_and(|error| error.is_undone_roughly);
     let uncorrelated = (!is_correlated(&base)).then(|| base.clone());
     let mut structure = mean_structure(records, base, &catalogue, restored);
     // Where the counts do not follow the robot at all, no small effect has a meaning: only one with which

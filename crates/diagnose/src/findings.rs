@@ -52,9 +52,11 @@ pub(crate) struct StageResults<'e, 'a> {
 }
 
 impl StageResults<'_, '_> {
-    /// Lost counts were restored roughly: they explain outliers and autocorrelated errors that are left.
+    /// Lost counts or stamps were restored roughly: they explain outliers and autocorrelated errors that are
+    /// left.
     fn restored(&self) -> bool {
         self.faults.iter().any(|fault| fault.is_restored_roughly())
+            || self.stamps.is_some_and(|stamps| stamps.is_undone_roughly)
     }
 }
 

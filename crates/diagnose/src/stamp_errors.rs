@@ -3,7 +3,7 @@
 //! Speeds, accelerations and the instants of measurements all come from the stamps. Stamps that are wrong by
 //! much are therefore more than one linear term: what that term leaves resembles other effects.
 
-use dataset::Dataset;
+use dataset::{Dataset, Run, SamplingPeriod};
 use estimation::ModelFit;
 
 use crate::augmented_model::{AugmentedModel, cost, count, refit};
@@ -19,6 +19,8 @@ pub(crate) struct StampError {
     /// Its test alone in the records as they are, with a p-value for one candidate.
     pub(crate) test: Test,
     pub(crate) records: Vec<Dataset>,
+    /// Stamps are later than rows can be told by in some run: what is left of their errors is unlike noise.
+    pub(crate) is_undone_roughly: bool,
     /// Log Bayes factor of it as a linear term over none.
     pub(crate) log_odds: f64,
     /// Cost of the model that has it as a linear term, its number of observations, and by how much it costs
@@ -34,6 +36,11 @@ impl StampError {
         let most = self.count.max(count(restamped));
         cost(restamped, most) <= self.cost + MIN_LOG_ODDS_MARGIN.max(MAX_RESTAMPING_LOSS * self.explains)
     }
+}
+
+/// Whether stamps do not tell of which tick each row of a run is.
+fn has_uncertain_rows(run: &Run) -> bool {
+    SamplingPeriod::of(&run.odometry.t_s).is_some_and(|period| !period.is_certain())
 }
 
 /// The most significant error of the stamps that restamping undoes, if it is significant among all of the
@@ -57,6 +64,7 @@ pub(crate) fn stamp_error(datasets: &[Dataset], base: &ModelFit<'_>, catalogue: 
             candidate: candidate.clone(),
             test,
             records: records.collect(),
+            is_undone_roughly: datasets.iter().flat_map(|dataset| &dataset.runs).any(has_uncertain_rows),
             log_odds,
             cost,
             count,
