@@ -26,7 +26,7 @@ use crate::settings::records::{
     MAX_REJECTED_FRACTION, MIN_COMMON_CLOCK_OFFSET_S, MIN_MEASUREMENTS_PER_RUN, MIN_REJECTING_CLOCK_OFFSET_S,
 };
 use crate::stage::{OnStage, Step};
-use crate::stamp_errors::stamp_error;
+use crate::stamp_errors::{stamp_error, whole_stamp_error};
 use crate::text;
 use crate::unknown_motion::unknown_motions;
 
@@ -172,6 +172,7 @@ fn stages(datasets: &[Dataset], options: &Options, min_common_clock_s: f64) -> R
     let every_term = mean_terms(&options.without);
     // Stamps that are wrong: everything that comes from them is sought in records that are restamped.
     let error = is_correlated(&base).then(|| stamp_error(records, &base, &every_term)).flatten();
+    let error = error.or_else(|| whole_stamp_error(records, &base, &every_term));
     let restamped = error.as_ref().and_then(|error| {
         let fit = correlated_base(&error.records, EVERY_MEASUREMENT.fit(&sessions(&error.records)).ok()?);
         error.is_undone_by(&fit).then_some((error, fit))

@@ -4,13 +4,15 @@
 //! much are therefore more than one linear term: what that term leaves resembles other effects.
 
 use dataset::{Dataset, Run, SamplingPeriod};
-use estimation::ModelFit;
+use estimation::{FitSettings, ModelFit, Thinning};
 
 use crate::augmented_model::{AugmentedModel, cost, count, refit};
 use crate::candidate::Candidate;
 use crate::model_comparison::log_bayes_factor;
+use crate::record_faults::sessions;
 use crate::settings::levels::{CLUSTER_ROBUST_LEVEL, MIN_LOG_ODDS_MARGIN, SCAN_LEVEL};
-use crate::settings::records::MAX_RESTAMPING_LOSS;
+use crate::settings::records::{MAX_RESTAMPING_LOSS, MIN_WHOLE_RESTAMPING_LOG_ODDS};
+use crate::statistics::p_of_chi_square;
 use crate::wald::{Test, cluster_robust_test, wald_test};
 
 /// An error of the stamps, and the records without it.
@@ -21,9 +23,9 @@ pub(crate) struct StampError {
     pub(crate) records: Vec<Dataset>,
     /// Stamps are later than rows can be told by in some run: what is left of their errors is unlike noise.
     pub(crate) is_undone_roughly: bool,
-    /// Log Bayes factor of it as a linear term over none.
+    /// Log Bayes factor of it as a linear term, or of the records without it, over none.
     pub(crate) log_odds: f64,
-    /// Cost of the model that has it as a linear term, its number of observations, and by how much it costs
+    /// Cost of the model that has it as a linear term, or of the fit to the records without it, its number of observations, and by how much it costs
     /// less than the model without.
     cost: f64,
     count: f64,
@@ -72,4 +74,45 @@ pub(crate) fn stamp_error(datasets: &[Dataset], base: &ModelFit<'_>, catalogue: 
         })
     });
     found.max_by(|a, b| a.test.statistic.total_cmp(&b.test.statistic))
+}
+
+/// An error of stamps that do not tell of which tick each row is, as of rows that wait for each other: speeds by
+/// such stamps are nothing that a linear term could be made of. The records on their beat are compared with the
+/// records as they are, to which `base` is fitted.
+pub(crate) fn whole_stamp_error(
+    datasets: &[Dataset],
+    base: &ModelFit<'_>,
+    catalogue: &[Candidate],
+) -> Option<StampError> {
+    if base.thinning != Thinning::NONE || !datasets.iter().flat_map(|dataset| &dataset.runs).any(has_uncertain_rows) {
+        return None;
+    }
+    let found = catalogue.iter().filter_map(|candidate| {
+        let restamped = candidate.restamped()?;
+        let records: Option<Vec<Dataset>> = datasets.iter().map(|dataset| restamped(dataset, 1.0, 0.0)).collect();
+        let records = records?;
+        let fit = FitSettings::GEOMETRY_ONLY.fit(&sessions(&records)).ok()?;
+        let count = count(base).max(count(&fit));
+        let cost_on_beat = cost(&fit, count);
+        let explains = cost(base, count) - cost_on_beat;
+        let log_odds = explains - (catalogue.len() as f64).ln();
+        if log_odds < MIN_WHOLE_RESTAMPING_LOG_ODDS {
+            return None;
+        }
+        let statistic = 2.0 * explains;
+        let estimates = vec![(1.0, statistic.sqrt().recip())];
+        let test = Test { statistic, p_value: p_of_chi_square(statistic, 1.0), estimates };
+        drop(fit);
+        Some(StampError {
+            candidate: candidate.clone(),
+            test,
+            records,
+            is_undone_roughly: true,
+            log_odds,
+            cost: cost_on_beat,
+            count,
+            explains,
+        })
+    });
+    found.max_by(|a, b| a.explains.total_cmp(&b.explains))
 }

@@ -15,7 +15,7 @@ use crate::filter_state::{FilterState, Step};
 use crate::kinematic_samples::KinematicSample;
 use crate::model::{Column, Instrument, Model};
 use crate::noise::{NOISES, Noise, NoiseComponent};
-use crate::noise_score::{JointUpdate, NoiseScore};
+use crate::noise_score::{JointUpdate, NoiseScore, TimingScore};
 use crate::noise_shape::{CorrelatedErrors, Whitened};
 use crate::pass_options::{OutlierGate, PassOptions};
 use crate::products::{Products, Sums};
@@ -24,7 +24,6 @@ use crate::rounding::Rounding;
 use crate::segment::{MeasuredPose, Segment, Start};
 use crate::settings::{OUTLIER_CHI_SQUARE, RESTART_AFTER_OUTLIERS};
 use crate::thinning::PropagationInterval;
-use crate::timing_noise::TimingScore;
 
 /// One whitened component of a measurement's innovation.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -17,6 +17,37 @@ pub(crate) struct NoiseScore {
     pub(crate) information: Matrix4<f64>,
 }
 
+/// Score of the log-likelihood by the variance of the instants of measurements, and its information: of each
+/// measurement with the innovation e, its covariance S and the instrument's velocity u, ½((uᵀS⁻¹e)² − uᵀS⁻¹u)
+/// and ½(uᵀS⁻¹u)².
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct TimingScore {
+    gradient: f64,
+    information: f64,
+}
+
+impl TimingScore {
+    /// Of a measurement, by uᵀS⁻¹e and uᵀS⁻¹u.
+    pub(crate) fn of(error: f64, velocity: f64) -> Self {
+        Self { gradient: 0.5 * (error * error - velocity), information: 0.5 * velocity * velocity }
+    }
+
+    pub(crate) fn add(&mut self, other: &Self, weight: f64) {
+        self.gradient += weight * other.gradient;
+        self.information += weight * other.information;
+    }
+
+    /// In standard deviations: standard normal where the variance is right.
+    pub(crate) fn z(&self) -> f64 {
+        if self.information > 0.0 { self.gradient / self.information.sqrt() } else { 0.0 }
+    }
+
+    /// By how much the variance is too small, s², by one step of scoring.
+    pub(crate) fn step_s2(&self) -> f64 {
+        if self.information > 0.0 { self.gradient / self.information } else { 0.0 }
+    }
+}
+
 /// What the filter knows of a whole measurement before it takes it.
 pub(crate) struct JointUpdate {
     pub(crate) errors: CorrelatedErrors,

@@ -11,7 +11,7 @@ use crate::group_extrinsics::GroupResponse;
 use crate::kinematic_samples::KinematicSample;
 use crate::model::{Column, Model};
 use crate::noise::Noise;
-use crate::noise_score::NoiseScore;
+use crate::noise_score::{NoiseScore, TimingScore};
 use crate::normal_equations::NormalEquations;
 use crate::partial_filter::filter_partial;
 use crate::pass_options::PassOptions;
@@ -21,7 +21,6 @@ use crate::records::Records;
 use crate::segment::{Segment, Start};
 use crate::settings::MIN_PARALLEL_WORK;
 use crate::thinning::{PropagationInterval, Selection};
-use crate::timing_noise::TimingScore;
 
 /// The result of a pass.
 #[derive(Debug, Clone)]
