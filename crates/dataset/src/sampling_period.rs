@@ -39,6 +39,8 @@ const FURTHER_LOST_COST: f64 = 2.0;
 const PAUSE_COST: f64 = 14.0;
 /// The same against a row that came by itself.
 const BY_ITSELF_COST: f64 = 10.0;
+/// Rows that are late together, for each beat by which stamps jitter.
+const WAITING_ROWS: f64 = 8.0;
 /// Deviations beyond which an error costs in proportion to its size (Huber 1964).
 const HUBER_SIGMAS: f64 = 1.5;
 /// A gap of less of the beat is between rows that waited for each other; rows come in bunches where more than
@@ -223,6 +225,8 @@ fn jitter(t_s: &[f64], period_s: f64) -> f64 {
 fn likeliest_numbers(t_s: &[f64], period_s: f64) -> (Vec<i64>, f64) {
     let at = |row: usize| (t_s[row] - t_s[0]) / period_s;
     let jitter = jitter(t_s, period_s);
+    // Rows that wait for each other are late together: so many say the same of one that is missing.
+    let together = (WAITING_ROWS * jitter).max(1.0);
     // The first row may be late itself.
     let usual = median((0..FIRST_ROWS).map(|row| at(row) - row as f64).collect()).unwrap_or(0.0);
     let mut rows: Vec<Vec<Path>> = vec![vec![Path { number: 0, cost: 0.0, usual, from: 0 }]];
@@ -238,16 +242,16 @@ fn likeliest_numbers(t_s: &[f64], period_s: f64) -> (Vec<i64>, f64) {
             for number in [path.number + 1, due.floor() as i64, due.ceil() as i64] {
                 if number > path.number {
                     let late = at(row) - number as f64 - path.usual;
-                    let cost = path.cost + step_cost(number - path.number) + huber(late / jitter);
+                    let cost = path.cost + together * step_cost(number - path.number) + huber(late / jitter);
                     let learnt = late.clamp(-2.0 * jitter, 2.0 * jitter) / MEMORY_ROWS.min(row as f64 + 1.0);
                     offer(Path { number, cost, usual: path.usual + learnt, from });
                 }
             }
             // A row that came by itself is of no tick, and as late as it likes.
-            offer(Path { cost: path.cost + BY_ITSELF_COST, from, ..path.to_owned() });
+            offer(Path { cost: path.cost + together * BY_ITSELF_COST, from, ..path.to_owned() });
             // The beat begins anew, as after a pause that is no whole number of ticks.
             let number = path.number + 1;
-            offer(Path { number, cost: path.cost + PAUSE_COST, usual: at(row) - number as f64, from });
+            offer(Path { number, cost: path.cost + together * PAUSE_COST, usual: at(row) - number as f64, from });
         }
         next.sort_by(|a, b| a.cost.total_cmp(&b.cost).then(a.number.cmp(&b.number)));
         next.truncate(PATHS);
