@@ -7,7 +7,7 @@
 
 use std::cell::LazyCell;
 
-use dataset::{MapDistortion, Run, Session, TruthSample};
+use dataset::{CovarianceScale, MapDistortion, Run, Session, TruthSample};
 use kinematics::{Increment, Pose};
 
 use crate::model::Model;
@@ -29,6 +29,8 @@ pub struct Records<'a> {
     pub(crate) gyro_scale_sigma: Option<f64>,
     /// The distortion of the map in which poses are, where it is stated: sessions have one map.
     pub map: Option<MapDistortion>,
+    /// Rows state their precision up to one factor of positions and headings together.
+    pub(crate) common_scale: bool,
     /// Runs without wheels or with fewer than two measurements.
     pub unused: Vec<(usize, usize)>,
     /// Ids of all runs by session.
@@ -48,6 +50,7 @@ impl<'a> Records<'a> {
     pub(crate) fn relative_to(sessions: &[Session<'a>], reference: [f64; 2]) -> Self {
         let mut records = Self::nothing();
         records.gyro_scale_sigma = sessions.iter().find_map(|session| session.truth_noise.gyro.scale_sigma);
+        records.common_scale = sessions.iter().all(has_common_scale);
         records.map = sessions.iter().find_map(|session| session.truth_noise.map);
         let nominal = sessions.first().and_then(|session| Some(Model::of(&session.robot.geometry().ok()?, 0)));
         for (number, session) in sessions.iter().enumerate() {
@@ -95,6 +98,7 @@ impl<'a> Records<'a> {
             partial: Vec::new(),
             gyro_scale_sigma: None,
             map: None,
+            common_scale: false,
             unused: Vec::new(),
             ids: Vec::new(),
         }
@@ -267,6 +271,18 @@ impl<'a> Records<'a> {
             between_s.collect::<Vec<f64>>()
         })
     }
+}
+
+/// Does a session say so, and does every row state its precision?
+fn has_common_scale(session: &Session<'_>) -> bool {
+    let states_all = |run: &Run| {
+        let states = |sigma: &dataset::TruthSigma| {
+            sigma.covariance.is_some() || (sigma.sigma_xy_m.is_some() && sigma.sigma_theta_rad.is_some())
+        };
+        run.truth.is_empty() || run.truth_sigma.as_ref().is_some_and(|sigmas| sigmas.iter().all(states))
+    };
+    let is_common = session.truth_noise.covariance_scale == CovarianceScale::Common;
+    is_common && session.runs.iter().all(|run| states_all(run.run()))
 }
 
 /// What the instrument measured in a run; intervals are not counted yet.
