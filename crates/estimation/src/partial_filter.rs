@@ -91,7 +91,7 @@ pub(crate) fn filter_partial(
 }
 
 /// Filters the observations of a segment that are taken.
-fn filter_taken(
+pub(crate) fn filter_taken(
     segment: &PartialSegment<'_>,
     (propagations, taken): (&[PropagationInterval], &[bool]),
     poses: &TakenPoses<'_>,

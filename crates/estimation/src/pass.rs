@@ -15,6 +15,7 @@ use crate::noise_score::NoiseScore;
 use crate::normal_equations::NormalEquations;
 use crate::partial_filter::filter_partial;
 use crate::partial_poses::TakenPoses;
+use crate::partial_records::PartialSegment;
 use crate::pass_options::PassOptions;
 use crate::products::Products;
 use crate::propagation::{CachedPropagation, CarriedState, PropagationSource, SegmentCache};
@@ -196,7 +197,8 @@ pub(crate) fn pass(
             result.samples.push(samples);
         }
     }
-    for (selection, rejected) in selections.iter().zip(&outliers) {
+    let with_partial = selections.iter().zip(&outliers).filter(|_| records.has_partial());
+    for (selection, rejected) in with_partial {
         let poses = TakenPoses::of(&records.segments, free_headings, &selection.propagations, rejected);
         add_partial(&mut result, (records, selection, weight), &poses, (model, noise), &products, terms);
     }
@@ -216,13 +218,19 @@ fn add_partial(
     poses: &TakenPoses<'_>,
     (model, noise): (&Model, &Noise),
     products: &Products,
-    terms: &mut [Box<dyn ModelTerm>],
+    terms: &[Box<dyn ModelTerm>],
 ) {
     let columns = Column::BASE.len() + terms.iter().map(|term| term.parameters().len()).sum::<usize>();
     let mut prior = records.gyro_scale_sigma.map(|sigma| sigma.powi(-2));
-    for (partial, propagations) in records.partial.iter().zip(&selection.partial) {
-        let Some(propagations) = propagations else { continue };
-        let (equations, score) = filter_partial(partial, propagations, poses, (model, noise), products, terms);
+    let filtered = |terms: &mut Vec<Box<dyn ModelTerm>>,
+                    of: (&PartialSegment<'_>, &Option<Vec<PropagationInterval>>)| {
+        Some(filter_partial(of.0, of.1.as_ref()?, poses, (model, noise), products, terms))
+    };
+    let segments = records.partial.par_iter().zip(&selection.partial);
+    let found: Vec<_> = segments.map_init(|| terms.to_vec(), filtered).collect();
+    // Sums are taken in the order of the segments.
+    for (partial, found) in records.partial.iter().zip(found) {
+        let Some((equations, score)) = found else { continue };
         let run = partial.segment.run;
         let at = result.runs.partition_point(|of| of.run < run);
         if result.runs.get(at).is_none_or(|of| of.run != run) {

@@ -1,12 +1,22 @@
 //! Covariances that rows state up to one factor of positions and headings together.
 
-use dataset::{CovarianceScale, Dataset, TruthSigma};
+use dataset::{CovarianceScale, Dataset, TruthSample, TruthSigma};
+use kinematics::Pose;
+
+use super::partial::{NO_GYRO, dataset};
 
 use crate::{FitSettings, NoiseComponent};
 
-/// Rows whose positions are stated right and whose headings are stated ten times too large.
+/// Positions that err by 2 mm and headings by 2 mrad, by rows that state `row`.
 fn log(scale: CovarianceScale, row: TruthSigma) -> Dataset {
-    let mut dataset = super::dataset_of(8, true);
+    let mut dataset = dataset(NO_GYRO, |run, poses| {
+        for at in (0..=280).step_by(5) {
+            let error = |k: f64| 2e-3 * 2.0_f64.sqrt() * (12.9898 * at as f64 + 78.233 * k).sin();
+            let Pose { x_m, y_m, theta_rad } = poses[at];
+            let (x_m, y_m, theta_rad) = (x_m + error(1.0), y_m + error(2.0), theta_rad + error(3.0));
+            run.truth.push(TruthSample::new(run.odometry.t_s[at], x_m, y_m, Some(theta_rad)));
+        }
+    });
     dataset.truth_noise.covariance_scale = scale;
     for run in &mut dataset.runs {
         run.truth_sigma = Some(vec![row; run.truth.len()]);
