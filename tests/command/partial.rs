@@ -91,7 +91,7 @@ fn a_gyro_tapes_and_marks_beside_poses_make_them_more_certain_and_each_tells_the
     }
     fs::remove_file(folder.join("robot/distance.csv")).expect("removed");
     let without_tape = sigmas();
-    // By the sweep of the scenario the tape halves what is left of the wheels' own noise.
+    // A tape of 1 mm is several times as exact over 3 m as poses of 10 mm at 1 Hz.
     assert!(all[0] < 0.95 * without_tape[0], "{all:?} {without_tape:?}");
 }
 

@@ -98,7 +98,7 @@ pub struct TruthNoise {
     pub sigma_xy_m: Option<f64>,
     /// Of the heading, radians.
     pub sigma_theta_rad: Option<f64>,
-    /// What rows' own standard deviations and covariances are known up to.
+    /// What the rows' own standard deviations and covariances are known up to.
     pub covariance_scale: CovarianceScale,
     /// The map in which its poses are; `None`: it has none, or nothing is known of its errors.
     pub map: Option<MapDistortion>,
@@ -106,7 +106,7 @@ pub struct TruthNoise {
     pub gyro: GyroNoise,
 }
 
-/// What the standard deviations and covariances that rows of the truth state are known up to; it is estimated.
+/// What standard deviations and covariances that rows of the truth state are known up to; it is estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CovarianceScale {

@@ -1,5 +1,5 @@
-//! Noise of the wheels and of the instrument: four variances and their priors, and the noise of the instants of
-//! measurements.
+//! Noise of the wheels and of the instrument: four variances and their priors, and the noise of the instants
+//! of measurements.
 
 use dataset::TruthNoise;
 use nalgebra::Matrix4xX;
@@ -35,8 +35,8 @@ pub(crate) const NOISES: usize = NoiseComponent::ALL.len();
 pub struct Noise {
     /// The variances in the order of [`NoiseComponent::ALL`], which says what each is of, and its unit.
     pub variance: [f64; 4],
-    /// Of the instants of measurements on the log's clock, s²: stamps that jitter, and motion that rows do not
-    /// tell. A robot that stands shows none of it.
+    /// Of the instants of measurements on the log's clock, s²: stamps that jitter, and motion that rows do
+    /// not tell. A robot that stands shows none of it.
     pub timing_s2: f64,
 }
 

@@ -8,8 +8,8 @@
 //!
 //! Beside poses the filter starts in their room with hardly any knowledge of where, and takes them as whole
 //! measurements. What the partial measurements say given the poses is then its sums with both less its sums
-//! with the poses alone: ln p(partial | poses) = ln p(partial, poses) − ln p(poses). The poses themselves stay
-//! with [`crate::filter`], and a measurement of no weight changes nothing.
+//! with the poses alone: ln p(partial | poses) = ln p(partial, poses) − ln p(poses). The poses themselves
+//! stay with [`crate::filter`], and a measurement of no weight changes nothing.
 
 use kinematics::{Pose, sin_cos, wrap_to_pi};
 use model_term::ModelTerm;
@@ -58,8 +58,8 @@ struct PartialFilter<'f> {
     covariance: DMatrix<f64>,
     /// ∂state/∂column.
     by: DMatrix<f64>,
-    /// Derivatives of covariance and state by the logarithms of the variances: those of the motion, and beside
-    /// poses those of the instrument.
+    /// Derivatives of covariance and state by the logarithms of the variances: those of the motion, and
+    /// beside poses those of the instrument.
     covariance_by: Vec<DMatrix<f64>>,
     state_by: Vec<DVector<f64>>,
     /// Which place each slot holds.

@@ -1,5 +1,5 @@
-//! Measured poses beside partial measurements: which of them a phase takes, and what each says of the state of
-//! [`crate::partial_filter`], as a whole with the covariance of its errors.
+//! Measured poses beside partial measurements: which of them a phase takes, and what each says of the state
+//! of [`crate::partial_filter`], as a whole with the covariance of its errors.
 
 use kinematics::{Pose, sin_cos, wrap_to_pi};
 use nalgebra::{Matrix3, MatrixXx3, Vector3};
@@ -86,11 +86,11 @@ impl TakenPoses<'_> {
 pub(crate) struct PoseUpdate {
     /// Derivatives of its coordinates by the state.
     pub(crate) by_state: MatrixXx3<f64>,
-    /// The same by columns that do not act through the state: the columns from the first of the instrument on.
+    /// The same by columns that do not act through the state: those from the first of the instrument on.
     pub(crate) direct: Vec<Vector3<f64>>,
     /// What was measured less what was expected.
     pub(crate) innovation: Vector3<f64>,
-    /// Covariance of its errors, and the derivatives by the logarithms of the variances of position and heading.
+    /// Covariance of its errors, and its derivatives by the logarithms of both variances.
     pub(crate) errors: Matrix3<f64>,
     pub(crate) errors_by: [Matrix3<f64>; 2],
     /// Two where the heading is not measured.
@@ -98,8 +98,8 @@ pub(crate) struct PoseUpdate {
 }
 
 impl PoseUpdate {
-    /// Of a measured pose at a place of a segment, where the drive's centre stands at `pose` by the filter; the
-    /// pose stands in a state of some size `at` an index. What terms add comes from their state in force.
+    /// Of a measured pose at a place of a segment, where the drive's centre stands at `pose` by the filter;
+    /// the pose stands in a state of some size `at` an index. What terms add comes from their state in force.
     pub(crate) fn of(
         measured: &MeasuredPose,
         (partial, place): (&PartialSegment<'_>, usize),

@@ -113,8 +113,8 @@ struct Stretch<'a> {
 }
 
 /// The partial measurements of a run, with its `poses`: the segments of these, the first of which has the
-/// index `first`. A run with displacements gives none: these hold the wheels' errors as well, and a likelihood
-/// that counts them twice would be too sure.
+/// index `first`. A run with displacements gives none: these hold the wheels' errors as well, and a
+/// likelihood that counts them twice would be too sure.
 pub(crate) fn partial_segments<'a>(
     run: &RunView<'a>,
     base: &Segment<'a>,

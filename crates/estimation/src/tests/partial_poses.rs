@@ -156,8 +156,8 @@ fn poses_are_what_they_are_in_their_own_filter() {
             let of_own = own.information[(column, column)];
             let information = found.information[(column, column)] / of_own - 1.0;
             let gradient = (found.gradient[column] - own.gradient[column]) / of_own.sqrt();
-            // Components are taken together here and one after the other there: second orders of headings that
-            // are off by a milliradian. Rejects a lever or a rounding that one of them lacks.
+            // Components are taken together here and one after the other there: second orders of headings
+            // that are off by a milliradian. Rejects a lever or a rounding that one of them lacks.
             assert!(information.abs() < 1e-3 && gradient.abs() < 1e-3, "{column}: {information:e} {gradient:e}");
         }
     }
