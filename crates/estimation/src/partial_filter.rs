@@ -186,9 +186,9 @@ impl<'f> PartialFilter<'f> {
     /// What was known of the pose does not hold any more; the places before it stay as they are.
     fn start_anew(&mut self, place: usize) {
         let copy = self.at_place(place);
-        for row in 0..3 {
+        for (row, variance) in START_VARIANCE.into_iter().enumerate() {
             for (a, b) in [(0, 0), (0, copy), (copy, 0), (copy, copy)] {
-                self.covariance[(a + row, b + row)] += START_VARIANCE[row];
+                self.covariance[(a + row, b + row)] += variance;
             }
         }
     }

@@ -34,7 +34,7 @@ impl<'p> TakenPoses<'p> {
             let first = propagations.first().map(|first| (segment, first.from));
             first.into_iter().chain(propagations.iter().map(|of| (segment, of.measurement))).collect::<Vec<_>>()
         };
-        let taken = propagations.iter().enumerate().flat_map(|of| of_segment(of)).collect();
+        let taken = propagations.iter().enumerate().flat_map(of_segment).collect();
         Self { segments, free_headings, taken, rejected }
     }
 
