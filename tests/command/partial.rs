@@ -73,20 +73,51 @@ fn gyro_tape_and_whole_turns_determine_a_robot_and_each_of_them_is_missed() {
     assert!(evaluated.stdout.contains("no absolute truth"), "{} {}", evaluated.stdout, evaluated.stderr);
 }
 
+const BESIDE_POSES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/beside-poses.toml");
+
 #[test]
-fn measurements_beside_poses_are_said_to_be_unused() {
+fn a_gyro_tapes_and_marks_beside_poses_make_them_more_certain_and_each_tells_the_truth() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let folder = folder.path();
-    let scenario = concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/motion-capture.toml");
-    succeed(folder, &["simulate", scenario, "--out", "robot"]);
-    let problems = || {
-        let found = document(folder, &["check", "robot"]);
-        let all = found["problems"].as_array().expect("problems").clone();
-        all.into_iter().filter(|problem| problem["id"] == "unused_measurements").collect::<Vec<_>>()
-    };
-    assert!(problems().is_empty());
-    let table = "run,t0_s,t1_s,distance_m,sigma_m\nstraight_000,0,5,1.5,0.002\n";
-    fs::write(folder.join("robot/distance.csv"), table).expect("written");
-    let found = problems();
+    succeed(folder, &["simulate", BESIDE_POSES, "--out", "robot"]);
+    assert!(problems(folder).is_empty());
+    let truth = truth(folder);
+    let sigmas = || parameters(folder).each_ref().map(|found| found["sigma"].as_f64().expect("a sigma"));
+    let all = sigmas();
+    for (found, truth) in parameters(folder).iter().zip(truth) {
+        let (value, sigma) = (found["value"].as_f64().expect("a value"), found["sigma"].as_f64().expect("a sigma"));
+        // Four standard deviations: one draw in 16 000 is farther off.
+        assert!((value - truth).abs() < 4.0 * sigma, "{value} ± {sigma}, not {truth}");
+    }
+    fs::remove_file(folder.join("robot/distance.csv")).expect("removed");
+    let without_tape = sigmas();
+    // A tape of 1 mm is several times as exact over 3 m as poses of 10 mm at 1 Hz.
+    assert!(all[0] < 0.95 * without_tape[0], "{all:?} {without_tape:?}");
+}
+
+/// Problems of measurements that are not used.
+fn problems(folder: &Path) -> Vec<Value> {
+    let found = document(folder, &["check", "robot"]);
+    let all = found["problems"].as_array().expect("problems").clone();
+    all.into_iter().filter(|problem| problem["id"] == "unused_measurements").collect()
+}
+
+#[test]
+fn measurements_beside_displacements_are_said_to_be_unused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let folder = folder.path();
+    let robot = folder.join("robot");
+    fs::create_dir(&robot).expect("made");
+    let manifest = "format = 1\n[robot]\nleft_wheel_diameter_m = 0.16\nright_wheel_diameter_m = 0.16\n\
+                    wheel_separation_m = 0.363\n[[run]]\nid = \"a\"\n";
+    fs::write(robot.join("dataset.toml"), manifest).expect("written");
+    let rows: String = (0..=100).map(|row| format!("a,{0},{0},{0}\n", 0.1 * f64::from(row))).collect();
+    fs::write(robot.join("odometry.csv"), format!("run,t_s,left_rad,right_rad\n{rows}")).expect("written");
+    let displacement = "run,t0_s,t1_s,dx_m,dy_m,dtheta_rad\na,0,5,0.4,0,0\na,5,10,0.4,0,0\n";
+    fs::write(robot.join("displacement.csv"), displacement).expect("written");
+    assert!(problems(folder).is_empty());
+    let table = "run,t0_s,t1_s,distance_m,sigma_m\na,0,10,0.8,0.002\n";
+    fs::write(robot.join("distance.csv"), table).expect("written");
+    let found = problems(folder);
     assert!(found.len() == 1 && found[0]["severity"] == "warning", "{found:?}");
 }

@@ -43,8 +43,9 @@ pub use pose_covariance::PoseCovariance;
 pub use prefetch::read_ahead;
 pub use read::{Blocks, Loaded, RunByRun, read};
 pub use record::{
-    Dataset, Displacement, ExtraChannel, MarkedPoint, NominalRobot, Odometry, PointReading, Protocol, ProtocolSettings,
-    Provenance, Run, RunInfo, TruthNoise, TruthSample, TruthSigma, UnknownMotion, WheelLog, WheelSpeed,
+    CovarianceScale, Dataset, Displacement, ExtraChannel, MarkedPoint, NominalRobot, Odometry, PointReading, Protocol,
+    ProtocolSettings, Provenance, Run, RunInfo, TruthNoise, TruthSample, TruthSigma, UnknownMotion, WheelLog,
+    WheelSpeed,
 };
 pub use row_lengths::row_jitter_s;
 pub use sampling_period::SamplingPeriod;

@@ -98,10 +98,29 @@ pub struct TruthNoise {
     pub sigma_xy_m: Option<f64>,
     /// Of the heading, radians.
     pub sigma_theta_rad: Option<f64>,
+    /// What the rows' own standard deviations and covariances are known up to.
+    pub covariance_scale: CovarianceScale,
     /// The map in which its poses are; `None`: it has none, or nothing is known of its errors.
     pub map: Option<MapDistortion>,
     /// The gyroscope.
     pub gyro: GyroNoise,
+}
+
+/// What standard deviations and covariances that rows of the truth state are known up to; it is estimated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CovarianceScale {
+    /// One factor of positions and one of headings: two instruments' specifications.
+    #[default]
+    Separate,
+    /// One factor of both, the variance of unit weight: covariances of one filter.
+    Common,
+}
+
+impl CovarianceScale {
+    pub(crate) fn is_separate(&self) -> bool {
+        *self == Self::Separate
+    }
 }
 
 /// A point marked on the robot, in the body frame.

@@ -37,6 +37,7 @@ mod nuisances;
 mod one_step;
 mod optimizer;
 mod partial_filter;
+mod partial_poses;
 mod partial_records;
 mod pass;
 mod pass_options;

@@ -72,7 +72,8 @@ impl<'a> ModelFit<'a> {
         if records.has_gyro() {
             columns.push(Column::GyroScale);
         }
-        let prior = NoisePrior::of(sessions.first().map(|session| session.truth_noise).unwrap_or_default());
+        let stated = sessions.first().map(|session| session.truth_noise).unwrap_or_default();
+        let prior = NoisePrior { common_scale: records.common_scale, ..NoisePrior::of(stated) };
         Self {
             selections: Arc::new(Selection::of(&records, Thinning::NONE, &nominal)),
             thinning: Thinning::NONE,

@@ -1,7 +1,8 @@
-//! Noise of the wheels and of the instrument: four variances and their priors, and the noise of the instants of
-//! measurements.
+//! Noise of the wheels and of the instrument: four variances and their priors, and the noise of the instants
+//! of measurements.
 
 use dataset::TruthNoise;
+use nalgebra::Matrix4xX;
 
 use crate::settings::{
     FIXED_NOISE_LOG_SIGMA, HEADING_PRIOR_SIGMA_RAD, MIN_NOISE_SIGMA, NOISE_PRIOR_LOG_SIGMA, POSITION_PRIOR_SIGMA_M,
@@ -34,8 +35,8 @@ pub(crate) const NOISES: usize = NoiseComponent::ALL.len();
 pub struct Noise {
     /// The variances in the order of [`NoiseComponent::ALL`], which says what each is of, and its unit.
     pub variance: [f64; 4],
-    /// Of the instants of measurements on the log's clock, s²: stamps that jitter, and motion that rows do not
-    /// tell. A robot that stands shows none of it.
+    /// Of the instants of measurements on the log's clock, s²: stamps that jitter, and motion that rows do
+    /// not tell. A robot that stands shows none of it.
     pub timing_s2: f64,
 }
 
@@ -44,6 +45,8 @@ pub struct Noise {
 pub(crate) struct NoisePrior {
     pub(crate) centre: [f64; 4],
     pub(crate) log_sd: [f64; 4],
+    /// Variances of position and heading keep their ratio: one factor is estimated of both.
+    pub(crate) common_scale: bool,
     /// As in [`Noise`]; it is fitted outside the optimizer, and has no prior.
     pub(crate) timing_s2: f64,
 }
@@ -62,8 +65,21 @@ impl NoisePrior {
                 theta.unwrap_or(HEADING_PRIOR_SIGMA_RAD),
             ],
             log_sd: [NOISE_PRIOR_LOG_SIGMA, NOISE_PRIOR_LOG_SIGMA, log_sd(xy), log_sd(theta)],
+            common_scale: false,
             timing_s2: 0.0,
         }
+    }
+
+    /// The directions in which the logarithms of the variances move.
+    pub(crate) fn directions(&self) -> Matrix4xX<f64> {
+        let all = Matrix4xX::identity(NOISES);
+        if !self.common_scale {
+            return all;
+        }
+        let heading = NoiseComponent::MeasurementHeading as usize;
+        let mut together = all.remove_column(heading);
+        together[(heading, NoiseComponent::MeasurementPosition as usize)] = 1.0;
+        together
     }
 
     /// Prior standard deviations of a measurement's position, metres, and heading, radians.

@@ -356,9 +356,12 @@ impl NoiseStep {
         let gradient = found.noise.gradient + Vector4::from(pull.map(|(gradient, _)| gradient));
         let information =
             found.noise.information + Matrix4::from_diagonal(&Vector4::from(pull.map(|(_, curvature)| curvature)));
-        let Some(mut by) = information.cholesky().map(|cholesky| -cholesky.solve(&gradient)) else {
+        let directions = prior.directions();
+        let along = directions.tr_mul(&(information * &directions));
+        let Some(along) = along.cholesky().map(|cholesky| -cholesky.solve(&directions.tr_mul(&gradient))) else {
             return Self::none();
         };
+        let mut by: Vector4<f64> = &directions * along;
         // A variance at its lower bound does not fall.
         for (by, variance) in by.iter_mut().zip(noise.variance) {
             if variance <= MIN_NOISE_SIGMA * MIN_NOISE_SIGMA {

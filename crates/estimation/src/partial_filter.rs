@@ -5,20 +5,29 @@
 //! the rounding of the counts at its place. Every measurement is a scalar function of copies, bias and walls:
 //! with its derivative g the update is that of [`crate::filter`], P and its derivatives by ln(variance)
 //! included.
+//!
+//! Beside poses the filter starts in their room with hardly any knowledge of where, and takes them as whole
+//! measurements. What the partial measurements say given the poses is then its sums with both less its sums
+//! with the poses alone: ln p(partial | poses) = ln p(partial, poses) − ln p(poses). The poses themselves
+//! stay with [`crate::filter`], and a measurement of no weight changes nothing.
 
 use kinematics::{Pose, sin_cos, wrap_to_pi};
 use model_term::ModelTerm;
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, MatrixXx3, Vector3};
 
 use crate::model::{Column, Model};
-use crate::noise::{Noise, NoiseComponent};
+use crate::noise::{NOISES, Noise, NoiseComponent};
 use crate::noise_score::NoiseScore;
 use crate::normal_equations::NormalEquations;
+use crate::partial_poses::{PoseUpdate, TakenPoses, Taking};
 use crate::partial_records::{Observation, PartialSegment, Place, Quantity};
 use crate::products::{Products, Sums};
 use crate::propagation::{Moved, Propagator};
 use crate::rounding::PoseVariance;
-use crate::settings::{GYRO_BIAS_SIGMA_RADPS, MIN_DISTANCE_M, WALL_DIRECTION_SIGMA_RAD, WALL_OFFSET_SIGMA_M};
+use crate::settings::{
+    GYRO_BIAS_SIGMA_RADPS, MIN_DISTANCE_M, RESTART_AFTER_OUTLIERS, START_HEADING_SIGMA_RAD, START_POSITION_SIGMA_M,
+    WALL_DIRECTION_SIGMA_RAD, WALL_OFFSET_SIGMA_M,
+};
 use crate::thinning::PropagationInterval;
 
 /// Variances that the wheels' motion depends on.
@@ -34,35 +43,69 @@ const fn wall_at(wall: usize) -> usize {
     bias_at() + 1 + 2 * wall
 }
 
+/// Variances of the pose at the start of a segment beside poses.
+const START_VARIANCE: [f64; 3] = [
+    START_POSITION_SIGMA_M * START_POSITION_SIGMA_M,
+    START_POSITION_SIGMA_M * START_POSITION_SIGMA_M,
+    START_HEADING_SIGMA_RAD * START_HEADING_SIGMA_RAD,
+];
+
 struct PartialFilter<'f> {
     segment: &'f PartialSegment<'f>,
+    /// For each place the last observation that is taken and needs it.
+    last_use: Vec<Option<usize>>,
     state: DVector<f64>,
     covariance: DMatrix<f64>,
     /// ∂state/∂column.
     by: DMatrix<f64>,
-    /// Derivatives of covariance and state by the logarithms of the wheels' and the turns' variance.
-    covariance_by: [DMatrix<f64>; 2],
-    state_by: [DVector<f64>; 2],
+    /// Derivatives of covariance and state by the logarithms of the variances: those of the motion, and
+    /// beside poses those of the instrument.
+    covariance_by: Vec<DMatrix<f64>>,
+    state_by: Vec<DVector<f64>>,
     /// Which place each slot holds.
     slots: Vec<Option<usize>>,
     noise_score: NoiseScore,
 }
 
-/// Filters the partial measurements of a segment; `propagations` lead to each place after the first.
+/// What the partial measurements of a segment say, given its `poses`; `propagations` lead to each place after
+/// the first.
 pub(crate) fn filter_partial(
     segment: &PartialSegment<'_>,
     propagations: &[PropagationInterval],
-    model: &Model,
-    noise: &Noise,
+    poses: &TakenPoses<'_>,
+    (model, noise): (&Model, &Noise),
+    products: &Products,
+    terms: &mut [Box<dyn ModelTerm>],
+) -> (NormalEquations, NoiseScore) {
+    let mut filtered = |taking: Taking| {
+        let observations: Vec<bool> = segment.observations.iter().map(|of| poses.takes(of, taking)).collect();
+        filter_taken(segment, (propagations, &observations), poses, (model, noise), products, terms)
+    };
+    let (mut equations, mut score) = filtered(Taking::All);
+    if segment.has_poses() {
+        let (of_poses, score_of_poses) = filtered(Taking::PosesAlone);
+        equations.add(&of_poses, -1.0);
+        score.add(&score_of_poses, -1.0);
+    }
+    (equations, score)
+}
+
+/// Filters the observations of a segment that are taken.
+pub(crate) fn filter_taken(
+    segment: &PartialSegment<'_>,
+    (propagations, taken): (&[PropagationInterval], &[bool]),
+    poses: &TakenPoses<'_>,
+    (model, noise): (&Model, &Noise),
     products: &Products,
     terms: &mut [Box<dyn ModelTerm>],
 ) -> (NormalEquations, NoiseScore) {
     let columns = Column::BASE.len() + terms.iter().map(|term| term.parameters().len()).sum::<usize>();
     let mut sums = Sums::new(columns, products);
-    let mut filter = PartialFilter::new(segment, columns);
+    let mut filter = PartialFilter::new(segment, taken, poses.start(segment, model), columns);
     let mut propagator = Propagator::new(&segment.segment, model, terms);
     propagator.restart();
-    let mut observations = segment.observations.iter().enumerate().peekable();
+    let mut observations = segment.observations.iter().zip(taken).enumerate().peekable();
+    let mut rejected_in_a_row = 0;
     for (number, place) in segment.places.iter().enumerate() {
         if let Some(propagation) = number.checked_sub(1).and_then(|before| propagations.get(before)) {
             let moved = propagator.moved(filter.pose(), number - 1, propagation);
@@ -72,8 +115,28 @@ pub(crate) fn filter_partial(
             filter.advance(&moved, &by_terms, propagation, noise);
         }
         filter.remember(number, place, model);
-        while let Some((at, of)) = observations.next_if(|(_, of)| of.to == number) {
-            filter.update(of, model, columns, &mut sums);
+        while let Some((at, (of, taken))) = observations.next_if(|(_, (of, _))| of.to == number) {
+            match of.quantity {
+                _ if !taken => {}
+                Quantity::MeasuredPose { segment: of_segment, measurement } => {
+                    let Some(measured) = poses.get(of_segment, measurement) else { continue };
+                    let is_outlier = poses.is_outlier(of_segment, measurement);
+                    rejected_in_a_row = if is_outlier { rejected_in_a_row + 1 } else { 0 };
+                    // The poses' own filter starts anew there.
+                    let restarts = rejected_in_a_row >= RESTART_AFTER_OUTLIERS && measured.theta_rad.is_some();
+                    if restarts {
+                        filter.start_anew(number);
+                        rejected_in_a_row = 0;
+                    }
+                    if restarts || !is_outlier {
+                        let at = filter.at_place(number);
+                        let state = (filter.pose_at(at), at, filter.state.len());
+                        let of = PoseUpdate::of(measured, (segment, number), state, (model, noise), &mut propagator);
+                        filter.update_pose(&of, columns, &mut sums);
+                    }
+                }
+                _ => filter.update(of, model, columns, &mut sums),
+            }
             filter.forget(at);
         }
     }
@@ -81,32 +144,61 @@ pub(crate) fn filter_partial(
 }
 
 impl<'f> PartialFilter<'f> {
-    fn new(segment: &'f PartialSegment<'f>, columns: usize) -> Self {
-        let slots = most_at_once(segment);
+    /// Starts at a pose that is hardly known; without any at the origin of the segment's own frame.
+    fn new(segment: &'f PartialSegment<'f>, taken: &[bool], start: Option<Pose>, columns: usize) -> Self {
+        let mut last_use = vec![None; segment.places.len()];
+        for (number, (of, _)) in segment.observations.iter().zip(taken).enumerate().filter(|(_, (_, taken))| **taken) {
+            last_use[of.from] = Some(number);
+            last_use[of.to] = Some(number);
+        }
+        let slots = most_at_once(segment, &last_use);
         let first_slot = wall_at(segment.walls.len());
         let size = first_slot + 3 * slots;
         let (mut state, mut covariance) = (DVector::zeros(size), DMatrix::zeros(size, size));
         covariance[(bias_at(), bias_at())] = GYRO_BIAS_SIGMA_RADPS.powi(2);
+        let origin = start.unwrap_or(Pose::IDENTITY);
+        (state[0], state[1], state[2]) = (origin.x_m, origin.y_m, origin.theta_rad);
         for (wall, of) in segment.walls.iter().enumerate() {
             let at = wall_at(wall);
-            (state[at], state[at + 1]) = (of.direction_rad, of.offset_m);
+            let direction_rad = origin.theta_rad + of.direction_rad;
+            let (sin, cos) = sin_cos(direction_rad);
+            (state[at], state[at + 1]) = (direction_rad, of.offset_m - sin * origin.x_m + cos * origin.y_m);
             covariance[(at, at)] = WALL_DIRECTION_SIGMA_RAD.powi(2);
             covariance[(at + 1, at + 1)] = WALL_OFFSET_SIGMA_M.powi(2);
         }
+        if start.is_some() {
+            (0..3).for_each(|row| covariance[(row, row)] = START_VARIANCE[row]);
+        }
+        let noises = if start.is_some() { NOISES } else { OF_MOTION.len() };
         Self {
             segment,
+            last_use,
             state,
             covariance,
             by: DMatrix::zeros(size, columns),
-            covariance_by: [DMatrix::zeros(size, size), DMatrix::zeros(size, size)],
-            state_by: [DVector::zeros(size), DVector::zeros(size)],
+            covariance_by: vec![DMatrix::zeros(size, size); noises],
+            state_by: vec![DVector::zeros(size); noises],
             slots: vec![None; slots],
             noise_score: NoiseScore::zero(),
         }
     }
 
+    /// What was known of the pose does not hold any more; the places before it stay as they are.
+    fn start_anew(&mut self, place: usize) {
+        let copy = self.at_place(place);
+        for (row, variance) in START_VARIANCE.into_iter().enumerate() {
+            for (a, b) in [(0, 0), (0, copy), (copy, 0), (copy, copy)] {
+                self.covariance[(a + row, b + row)] += variance;
+            }
+        }
+    }
+
     fn pose(&self) -> Pose {
-        Pose::new(self.state[0], self.state[1], self.state[2])
+        self.pose_at(0)
+    }
+
+    fn pose_at(&self, at: usize) -> Pose {
+        Pose::new(self.state[at], self.state[at + 1], self.state[at + 2])
     }
 
     fn slot_at(&self, slot: usize) -> usize {
@@ -167,7 +259,9 @@ impl<'f> PartialFilter<'f> {
 
     /// Copies the pose at a place, with the rounding of the counts there.
     fn remember(&mut self, number: usize, place: &Place, model: &Model) {
-        let Some(slot) = self.slots.iter().position(Option::is_none) else { return };
+        // A place that no measurement which is taken is of needs no copy.
+        let needed = self.last_use[number].is_some();
+        let Some(slot) = self.slots.iter().position(Option::is_none).filter(|_| needed) else { return };
         self.slots[slot] = Some(number);
         let at = self.slot_at(slot);
         let copy = |matrix: &mut DMatrix<f64>| {
@@ -202,7 +296,7 @@ impl<'f> PartialFilter<'f> {
     /// Frees the slots of places that no observation after this one needs.
     fn forget(&mut self, observation: usize) {
         for slot in 0..self.slots.len() {
-            if self.slots[slot].is_some_and(|place| self.segment.places[place].last_use <= observation) {
+            if self.slots[slot].is_some_and(|place| self.last_use[place] <= Some(observation)) {
                 self.slots[slot] = None;
             }
         }
@@ -258,6 +352,8 @@ impl<'f> PartialFilter<'f> {
                 by[bias_at()] = dt_s;
                 of.value - scale * (at(to, 2) - at(from, 2)) - self.state[bias_at()] * dt_s
             }
+            // Taken as a whole, by `update_pose`.
+            Quantity::MeasuredPose { .. } => 0.0,
         };
         (off, by)
     }
@@ -285,10 +381,67 @@ impl<'f> PartialFilter<'f> {
         self.by += &gain * j;
     }
 
+    /// Takes a measured pose. With S = L Lᵀ the components of L⁻¹ v are independent.
+    fn update_pose(&mut self, of: &PoseUpdate, columns: usize, sums: &mut Sums<'_>) {
+        let h = &of.by_state;
+        let ph = &self.covariance * h;
+        // A sum of a covariance and one that is positive definite.
+        let Some(root) = (h.tr_mul(&ph) + of.errors).cholesky() else { return };
+        let mut by = -h.tr_mul(&self.by);
+        for (column, direct) in (Column::SensorX.index()..columns).zip(&of.direct) {
+            for row in 0..3 {
+                by[(row, column)] -= direct[row];
+            }
+        }
+        let lower = root.l();
+        let (Some(whitened), Some(whitened_by)) =
+            (lower.solve_lower_triangular(&of.innovation), lower.solve_lower_triangular(&by))
+        else {
+            return;
+        };
+        for component in 0..of.components {
+            let sigma = lower[(component, component)];
+            let mut j: Vec<f64> = whitened_by.row(component).iter().map(|by| by * sigma).collect();
+            j.resize(columns + 1, 0.0);
+            sums.add(&j, whitened[component] * sigma, sigma * sigma);
+        }
+        let inverse = root.inverse();
+        let gain = &ph * inverse;
+        self.score_pose(of, &gain, &inverse);
+        self.state += &gain * of.innovation;
+        self.covariance -= &gain * ph.transpose();
+        self.by += &gain * by;
+    }
+
+    /// The recursions differentiated, as in [`crate::noise_score`].
+    fn score_pose(&mut self, of: &PoseUpdate, gain: &MatrixXx3<f64>, inverse: &Matrix3<f64>) {
+        let (h, weighted) = (&of.by_state, inverse * of.innovation);
+        let (mut s_by, mut v_by) = ([Matrix3::zeros(); NOISES], [Vector3::zeros(); NOISES]);
+        for a in 0..self.covariance_by.len() {
+            let ph_by = &self.covariance_by[a] * h;
+            s_by[a] = h.tr_mul(&ph_by);
+            if let Some(own) = a.checked_sub(OF_MOTION.len()) {
+                s_by[a] += of.errors_by[own];
+            }
+            v_by[a] = -h.tr_mul(&self.state_by[a]);
+            self.state_by[a] += (&ph_by - gain * s_by[a]) * weighted + gain * v_by[a];
+            let half = (&ph_by - gain * (s_by[a] * 0.5)) * gain.transpose();
+            self.covariance_by[a] -= &half + half.transpose();
+        }
+        for a in 0..NOISES {
+            self.noise_score.gradient[a] +=
+                0.5 * ((inverse * s_by[a]).trace() - weighted.dot(&(s_by[a] * weighted))) + v_by[a].dot(&weighted);
+            for b in 0..NOISES {
+                self.noise_score.information[(a, b)] +=
+                    0.5 * (inverse * s_by[a] * inverse * s_by[b]).trace() + v_by[a].dot(&(inverse * v_by[b]));
+            }
+        }
+    }
+
     /// The recursions differentiated, as in [`crate::filter`].
     fn score_noise(&mut self, row: &DVector<f64>, gain: &DVector<f64>, v: f64, s: f64) {
-        let (mut s_by, mut v_by) = ([0.0; 2], [0.0; 2]);
-        for a in 0..OF_MOTION.len() {
+        let (mut s_by, mut v_by) = ([0.0; NOISES], [0.0; NOISES]);
+        for a in 0..self.covariance_by.len() {
             let ph_by = &self.covariance_by[a] * row;
             s_by[a] = row.dot(&ph_by);
             v_by[a] = -row.dot(&self.state_by[a]);
@@ -297,22 +450,21 @@ impl<'f> PartialFilter<'f> {
             let change = gain * half.transpose();
             self.covariance_by[a] -= &change + change.transpose();
         }
-        for (a, of) in OF_MOTION.into_iter().enumerate() {
-            let (s_of, at) = (s_by[a] / s, of as usize);
-            self.noise_score.gradient[at] += 0.5 * s_of * (1.0 - v * v / s) + v_by[a] * v / s;
-            for (b, other) in OF_MOTION.into_iter().enumerate() {
-                self.noise_score.information[(at, other as usize)] += 0.5 * s_of * s_by[b] / s + v_by[a] * v_by[b] / s;
+        for a in 0..NOISES {
+            self.noise_score.gradient[a] += 0.5 * (s_by[a] / s) * (1.0 - v * v / s) + v_by[a] * v / s;
+            for b in 0..NOISES {
+                self.noise_score.information[(a, b)] += 0.5 * (s_by[a] / s) * s_by[b] / s + v_by[a] * v_by[b] / s;
             }
         }
     }
 }
 
 /// How many places are needed at once.
-fn most_at_once(segment: &PartialSegment<'_>) -> usize {
+fn most_at_once(segment: &PartialSegment<'_>, last_use: &[Option<usize>]) -> usize {
     let mut observations = segment.observations.iter().enumerate().peekable();
     let (mut needed, mut most) = (Vec::new(), 1);
-    for (number, place) in segment.places.iter().enumerate() {
-        needed.push(place.last_use);
+    for (number, last_use) in last_use.iter().enumerate() {
+        needed.extend(*last_use);
         most = most.max(needed.len());
         while let Some((at, _)) = observations.next_if(|(_, of)| of.to == number) {
             needed.retain(|last_use| *last_use > at);

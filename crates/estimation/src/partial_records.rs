@@ -2,7 +2,8 @@
 //! says of the robot at one instant or at two.
 //!
 //! Every such measurement is a scalar function of where the robot stood at its instants, with a variance of
-//! its own. All of a run stand in one segment, since the wheels' errors are common to them.
+//! its own. All of a run stand in one segment, since the wheels' errors are common to them. The poses of the
+//! run, if it has any, stand in the same segment beside them.
 
 use std::collections::BTreeMap;
 
@@ -21,8 +22,6 @@ pub(crate) struct Place {
     pub(crate) after: usize,
     /// Variances of the wheels' turns beyond rounding, where it lies within a row, rad².
     pub(crate) interpolated_rad2: Wheels<f64>,
-    /// Index of the last observation that needs it.
-    pub(crate) last_use: usize,
 }
 
 /// What an observation is a function of.
@@ -41,6 +40,8 @@ pub(crate) enum Quantity {
         /// Length of the window, seconds.
         dt_s: f64,
     },
+    /// A measured pose, by its segment of the records and its index there; value and variance are its own.
+    MeasuredPose { segment: usize, measurement: usize },
 }
 
 /// A scalar that was measured.
@@ -65,7 +66,7 @@ pub(crate) struct Wall {
 /// The partial measurements of a run, without a gap of its log between them.
 #[derive(Debug, Clone)]
 pub(crate) struct PartialSegment<'a> {
-    /// The wheels' intervals; it has no measurements of poses.
+    /// The wheels' intervals; measurements of poses are in the records' other segments.
     pub(crate) segment: Segment<'a>,
     /// In the order of time.
     pub(crate) places: Vec<Place>,
@@ -78,6 +79,16 @@ pub(crate) struct PartialSegment<'a> {
 }
 
 impl PartialSegment<'_> {
+    /// Are there poses beside the partial measurements?
+    pub(crate) fn has_poses(&self) -> bool {
+        self.observations.iter().any(|of| matches!(of.quantity, Quantity::MeasuredPose { .. }))
+    }
+
+    /// Number of its measurements without the poses.
+    pub(crate) fn partial_measurements(&self) -> usize {
+        self.observations.iter().filter(|of| !matches!(of.quantity, Quantity::MeasuredPose { .. })).count()
+    }
+
     /// Does a gyroscope measure in it?
     pub(crate) fn has_gyro(&self) -> bool {
         self.observations.iter().any(|of| matches!(of.quantity, Quantity::GyroTurn { .. }))
@@ -101,20 +112,31 @@ struct Stretch<'a> {
     places: Vec<Place>,
 }
 
-/// The partial measurements of a run. A run with poses or displacements gives none: these hold the wheels'
-/// errors as well, and a likelihood that counts them twice would be too sure.
+/// The partial measurements of a run, with its `poses`: the segments of these, the first of which has the
+/// index `first`. A run with displacements gives none: these hold the wheels' errors as well, and a
+/// likelihood that counts them twice would be too sure.
 pub(crate) fn partial_segments<'a>(
     run: &RunView<'a>,
     base: &Segment<'a>,
+    (poses, first): (&[Segment<'a>], usize),
     track: &WheelAngleInterpolator<'_>,
     nominal: &Model,
     gyro: &GyroSettings,
 ) -> Vec<PartialSegment<'a>> {
     let (mut timed, walls) = tape_and_walls(run.run());
     timed.extend(gyro.windows(run, track));
-    if timed.is_empty() {
+    if timed.is_empty() || poses.iter().any(Segment::is_displacement) {
         return Vec::new();
     }
+    timed.extend(poses.iter().enumerate().flat_map(|(number, segment)| {
+        segment.measurements.iter().enumerate().map(move |(measurement, of)| Timed {
+            from_s: of.t_s,
+            to_s: of.t_s,
+            quantity: Quantity::MeasuredPose { segment: first + number, measurement },
+            value: 0.0,
+            variance: 0.0,
+        })
+    }));
     let mut instants: Vec<f64> = timed.iter().flat_map(|of| [of.from_s, of.to_s]).collect();
     instants.sort_by(f64::total_cmp);
     instants.dedup_by(|later, before| *later - *before <= TIME_TOLERANCE_S);
@@ -133,7 +155,7 @@ pub(crate) fn partial_segments<'a>(
                     let interpolated_rad2 =
                         segment.intervals.last().map_or(Wheels::both(0.0), |last| last.interpolated_rad2[1]);
                     placed.push((t_s, places.len()));
-                    places.push(Place { after: segment.intervals.len(), interpolated_rad2, last_use: 0 });
+                    places.push(Place { after: segment.intervals.len(), interpolated_rad2 });
                 }
                 continue;
             }
@@ -141,11 +163,11 @@ pub(crate) fn partial_segments<'a>(
         if let Some(turned_rad) = cursor.angle_rad(t_s) {
             let wheel_rad = turned_rad.zip_with(base.wheel_rad, |turned, first| first + turned);
             let segment = Segment { wheel_rad, start: Start::Origin, ..base.clone() };
-            let place = Place { after: 0, interpolated_rad2: Wheels::both(0.0), last_use: 0 };
+            let place = Place { after: 0, interpolated_rad2: Wheels::both(0.0) };
             parts.push(Stretch { segment, placed: vec![(t_s, 0)], places: vec![place] });
         }
     }
-    let of_part = |Stretch { segment, placed, mut places }: Stretch<'a>| {
+    let of_part = |Stretch { segment, placed, places }: Stretch<'a>| {
         let place_at = |t_s: f64| {
             let at = placed.partition_point(|(placed_s, _)| *placed_s < t_s - TIME_TOLERANCE_S);
             placed.get(at).filter(|(placed_s, _)| (placed_s - t_s).abs() <= TIME_TOLERANCE_S).map(|(_, place)| *place)
@@ -159,15 +181,11 @@ pub(crate) fn partial_segments<'a>(
             .collect();
         // Between equals the order of the files.
         observations.sort_by_key(|of| of.to);
-        for (number, of) in observations.iter().enumerate() {
-            places[of.from].last_use = number;
-            places[of.to].last_use = number;
-        }
         let walls = start_walls(&segment, &places, &observations, walls, nominal);
         let bias_walk = gyro.stated.bias_walk_radps_per_sqrt_s.unwrap_or(crate::settings::BIAS_WALK_RADPS).powi(2);
         PartialSegment { segment, places, observations, walls, bias_walk }
     };
-    parts.into_iter().map(of_part).filter(|of| !of.observations.is_empty()).collect()
+    parts.into_iter().map(of_part).filter(|of| of.partial_measurements() > 0).collect()
 }
 
 /// What tape measures and walls say, and how many walls there are.

@@ -14,6 +14,8 @@ use crate::noise::Noise;
 use crate::noise_score::{NoiseScore, TimingScore};
 use crate::normal_equations::NormalEquations;
 use crate::partial_filter::filter_partial;
+use crate::partial_poses::TakenPoses;
+use crate::partial_records::PartialSegment;
 use crate::pass_options::PassOptions;
 use crate::products::Products;
 use crate::propagation::{CachedPropagation, CarriedState, PropagationSource, SegmentCache};
@@ -119,6 +121,7 @@ pub(crate) fn pass(
         (equations, OfSegment { number, heading, innovations, samples, outliers, noise_score, timing, cached })
     };
     let mut phases = Vec::with_capacity(selections.len());
+    let mut outliers = Vec::with_capacity(selections.len());
     for (phase, selection) in selections.iter().enumerate() {
         let propagations = &selection.propagations;
         let of_run = |segments: &Range<usize>, equations: &mut NormalEquations, terms: &mut [Box<dyn ModelTerm>]| {
@@ -169,15 +172,14 @@ pub(crate) fn pass(
         let mut innovations = Vec::with_capacity(reused);
         let mut samples = Vec::new();
         let mut cached = vec![None; if pass_options.keep { propagations.len() } else { 0 }];
+        let mut rejected = Vec::new();
         for of in found.into_iter().flatten() {
             if pass_options.keep {
                 cached[of.number] = of.cached;
             }
             innovations.extend(of.innovations);
             samples.extend(of.samples);
-            if phase == 0 {
-                result.outliers.extend(of.outliers.into_iter().map(|measurement| (of.number, measurement)));
-            }
+            rejected.extend(of.outliers.into_iter().map(|measurement| (of.number, measurement)));
             if let (0, Some((rest, by))) = (phase, of.heading) {
                 let run = records.segments[of.number].run;
                 result.headings.push(FreeHeading { segment: of.number, run, rest, by });
@@ -185,6 +187,7 @@ pub(crate) fn pass(
             result.noise.add(&of.noise_score, weight);
             result.timing.add(&of.timing, weight);
         }
+        outliers.push(rejected);
         phases.push(cached);
         if pass_options.innovations {
             result.innovations.push(innovations);
@@ -193,9 +196,12 @@ pub(crate) fn pass(
             result.samples.push(samples);
         }
     }
-    for selection in selections {
-        add_partial(&mut result, (records, selection, weight), (model, noise), &products, terms);
+    let with_partial = selections.iter().zip(&outliers).filter(|_| records.has_partial());
+    for (selection, rejected) in with_partial {
+        let poses = TakenPoses::of(&records.segments, free_headings, &selection.propagations, rejected);
+        add_partial(&mut result, (records, selection, weight), &poses, (model, noise), &products, terms);
     }
+    result.outliers = outliers.into_iter().next().unwrap_or_default();
     result.cached = pass_options.keep.then(|| CachedPropagation { model: model.clone(), phases });
     if let Some(own) = &model.own {
         result.own = own.eliminate(&mut result.runs, model);
@@ -208,15 +214,22 @@ pub(crate) fn pass(
 fn add_partial(
     result: &mut Pass,
     (records, selection, weight): (&Records<'_>, &Selection, f64),
+    poses: &TakenPoses<'_>,
     (model, noise): (&Model, &Noise),
     products: &Products,
-    terms: &mut [Box<dyn ModelTerm>],
+    terms: &[Box<dyn ModelTerm>],
 ) {
     let columns = Column::BASE.len() + terms.iter().map(|term| term.parameters().len()).sum::<usize>();
     let mut prior = records.gyro_scale_sigma.map(|sigma| sigma.powi(-2));
-    for (partial, propagations) in records.partial.iter().zip(&selection.partial) {
-        let Some(propagations) = propagations else { continue };
-        let (equations, score) = filter_partial(partial, propagations, model, noise, products, terms);
+    let filtered = |terms: &mut Vec<Box<dyn ModelTerm>>,
+                    of: (&PartialSegment<'_>, &Option<Vec<PropagationInterval>>)| {
+        Some(filter_partial(of.0, of.1.as_ref()?, poses, (model, noise), products, terms))
+    };
+    let segments = records.partial.par_iter().zip(&selection.partial);
+    let found: Vec<_> = segments.map_init(|| terms.to_vec(), filtered).collect();
+    // Sums are taken in the order of the segments.
+    for (partial, found) in records.partial.iter().zip(found) {
+        let Some((equations, score)) = found else { continue };
         let run = partial.segment.run;
         let at = result.runs.partition_point(|of| of.run < run);
         if result.runs.get(at).is_none_or(|of| of.run != run) {

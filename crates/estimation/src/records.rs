@@ -7,7 +7,7 @@
 
 use std::cell::LazyCell;
 
-use dataset::{MapDistortion, Run, Session, TruthSample};
+use dataset::{CovarianceScale, MapDistortion, Run, Session, TruthSample};
 use kinematics::{Increment, Pose};
 
 use crate::model::Model;
@@ -23,12 +23,14 @@ use crate::wheel_angles::{WheelAngleInterpolator, WheelInterval};
 pub struct Records<'a> {
     /// The segments in the order of sessions, runs and time.
     pub segments: Vec<Segment<'a>>,
-    /// Partial measurements of runs without poses, in the order of sessions, runs and time.
+    /// Partial measurements of runs, in the order of sessions, runs and time.
     pub(crate) partial: Vec<PartialSegment<'a>>,
     /// Standard deviation of the gyroscope's relative scale, where it is stated.
     pub(crate) gyro_scale_sigma: Option<f64>,
     /// The distortion of the map in which poses are, where it is stated: sessions have one map.
     pub map: Option<MapDistortion>,
+    /// Rows state their precision up to one factor of positions and headings together.
+    pub(crate) common_scale: bool,
     /// Runs without wheels or with fewer than two measurements.
     pub unused: Vec<(usize, usize)>,
     /// Ids of all runs by session.
@@ -48,11 +50,12 @@ impl<'a> Records<'a> {
     pub(crate) fn relative_to(sessions: &[Session<'a>], reference: [f64; 2]) -> Self {
         let mut records = Self::nothing();
         records.gyro_scale_sigma = sessions.iter().find_map(|session| session.truth_noise.gyro.scale_sigma);
+        records.common_scale = sessions.iter().all(has_common_scale);
         records.map = sessions.iter().find_map(|session| session.truth_noise.map);
         let nominal = sessions.first().and_then(|session| Some(Model::of(&session.robot.geometry().ok()?, 0)));
         for (number, session) in sessions.iter().enumerate() {
             let mut session_m = 0.0;
-            // Only for runs without poses: its noise is sought in all rows of the session.
+            // Its noise is sought in all rows of the session.
             let gyro = LazyCell::new(|| GyroSettings::of(session));
             records.ids.push(session.runs.iter().map(|run| run.info().id.clone()).collect());
             for (position, run) in session.runs.iter().enumerate() {
@@ -72,8 +75,9 @@ impl<'a> Records<'a> {
                     };
                     add_poses(&mut records.segments, &base, &track, run.run(), measured_poses(run, reference));
                     add_displacements(&mut records.segments, &base, &track, run.run());
-                    if let Some(nominal) = nominal.as_ref().filter(|_| records.segments.len() == before) {
-                        let partial = partial_segments(run, &base, &track, nominal, &gyro);
+                    if let Some(nominal) = &nominal {
+                        let poses = (&records.segments[before..], before);
+                        let partial = partial_segments(run, &base, poses, &track, nominal, &gyro);
                         has_partial = !partial.is_empty();
                         records.partial.extend(partial);
                     }
@@ -94,6 +98,7 @@ impl<'a> Records<'a> {
             partial: Vec::new(),
             gyro_scale_sigma: None,
             map: None,
+            common_scale: false,
             unused: Vec::new(),
             ids: Vec::new(),
         }
@@ -111,7 +116,7 @@ impl<'a> Records<'a> {
         self.gyro_scale_sigma.is_some()
     }
 
-    /// Has some run no more than partial measurements?
+    /// Has some run partial measurements?
     #[must_use]
     pub const fn has_partial(&self) -> bool {
         !self.partial.is_empty()
@@ -140,11 +145,16 @@ impl<'a> Records<'a> {
     /// How many measurements there are.
     #[must_use]
     pub fn measurements(&self) -> usize {
-        let partial: usize = self.partial.iter().map(|of| of.observations.len()).sum();
-        partial + self.segments.iter().map(|segment| segment.measurements.len()).sum::<usize>()
+        let partial: usize = self.partial.iter().map(PartialSegment::partial_measurements).sum();
+        partial + self.poses()
     }
 
-    /// Mean distance that a wheel rolls between measurements, metres, by a model.
+    /// How many poses and displacements there are.
+    fn poses(&self) -> usize {
+        self.segments.iter().map(|segment| segment.measurements.len()).sum()
+    }
+
+    /// Mean distance that a wheel rolls between poses or displacements, metres, by a model.
     #[must_use]
     pub fn distance_between_measurements_m(&self, model: &Model) -> f64 {
         let of = |interval: &WheelInterval| {
@@ -152,8 +162,7 @@ impl<'a> Records<'a> {
             0.5 * (distance_m.left + distance_m.right)
         };
         let distance_m: f64 = self.segments.iter().flat_map(|segment| &segment.intervals).map(of).sum();
-        let measurements = self.measurements().max(1) as f64;
-        distance_m / measurements
+        distance_m / self.poses().max(1) as f64
     }
 
     /// Time of a measurement of a segment, seconds from the run's start.
@@ -262,6 +271,18 @@ impl<'a> Records<'a> {
             between_s.collect::<Vec<f64>>()
         })
     }
+}
+
+/// Does a session say so, and does every row state its precision?
+fn has_common_scale(session: &Session<'_>) -> bool {
+    let states_all = |run: &Run| {
+        let states = |sigma: &dataset::TruthSigma| {
+            sigma.covariance.is_some() || (sigma.sigma_xy_m.is_some() && sigma.sigma_theta_rad.is_some())
+        };
+        run.truth.is_empty() || run.truth_sigma.as_ref().is_some_and(|sigmas| sigmas.iter().all(states))
+    };
+    let is_common = session.truth_noise.covariance_scale == CovarianceScale::Common;
+    is_common && session.runs.iter().all(|run| states_all(run.run()))
 }
 
 /// What the instrument measured in a run; intervals are not counted yet.

@@ -40,6 +40,8 @@ impl ModelFit<'_> {
     #[must_use]
     pub fn resimulated(&self, terms: &mut [Box<dyn ModelTerm>], number: u64) -> Self {
         let mut records = (*self.records).clone();
+        // What was measured beside the poses is of the motion that was driven, not of the one that is drawn.
+        records.partial.iter_mut().filter(|of| of.has_poses()).for_each(|of| of.observations.clear());
         let mut carried: Option<CarriedState> = None;
         for (index, segment) in records.segments.iter_mut().enumerate() {
             let mut draws = Draws::of(number, index);

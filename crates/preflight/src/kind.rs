@@ -57,8 +57,7 @@ pub(crate) enum Kind {
     OneWayTurns { left: bool },
     /// Parameters that these runs do not determine.
     NotDetermined { parameters: Vec<&'static str>, turns: bool, partial: bool },
-    /// Tapes, walls, returns or a gyroscope in runs that have poses or displacements too, where no method
-    /// takes them.
+    /// Tapes, walls, returns or a gyroscope in runs that have displacements too, where no method takes them.
     UnusedMeasurements { gyro_alone: bool },
 }
 

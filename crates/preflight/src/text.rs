@@ -184,7 +184,7 @@ pub(crate) fn sentence(kind: &Kind, runs: Option<&[String]>) -> String {
             format!("these runs do not determine {}: {why}; {what}", parameters.join(", "))
         }
         Kind::UnusedMeasurements { gyro_alone } => format!(
-            "the run's poses are used, and not its {}, which says less of the same motion; to calibrate from that, leave the run's poses out",
+            "the run's displacements are used, and not its {}, which says less of the same motion; to calibrate from that, leave the run's displacements out",
             if *gyro_alone { "gyro" } else { "gyro, tapes, walls or returns" }
         ),
     };

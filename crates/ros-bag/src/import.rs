@@ -157,7 +157,8 @@ pub fn import(path: &Path, options: &Options) -> Result<FromBag, RosBagError> {
     let mut warnings = both.losses.clone();
     warnings.extend(both.wheels.warnings());
     warnings.extend(both.truth.warnings());
-    if choice::is_own_estimate(truth, options.truth_frames.as_ref()) {
+    let is_own_estimate = choice::is_own_estimate(truth, options.truth_frames.as_ref());
+    if is_own_estimate {
         warnings.push(format!(
             "topic {}: poses of this name and type are mostly computed from the wheels themselves; calibration needs an independent instrument",
             truth.name
@@ -167,7 +168,10 @@ pub fn import(path: &Path, options: &Options) -> Result<FromBag, RosBagError> {
     warnings.extend(gyro_open);
     let gyro = gyro_column(&both, clocks[0], options, &mut warnings)?;
     let took = took(&both, [wheels_what, truth_reader.describe()], clocks, gyro.is_some());
-    let dataset = assemble(&both, clocks, gyro, (robot, geometry), path, options, &mut warnings)?;
+    let mut dataset = assemble(&both, clocks, gyro, (robot, geometry), path, options, &mut warnings)?;
+    if is_own_estimate {
+        warnings.extend(truth::scale_covariances(&mut dataset, &truth.name));
+    }
     warnings.extend(wrap_warnings(&dataset).iter().map(ToString::to_string));
     Ok(FromBag { dataset, took, warnings })
 }

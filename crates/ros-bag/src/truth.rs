@@ -1,6 +1,6 @@
 //! Poses of an outside instrument from messages.
 
-use dataset::{PoseCovariance, TruthSigma};
+use dataset::{CovarianceScale, Dataset, PoseCovariance, TruthSigma};
 
 use crate::error::RosBagError;
 use crate::topics::{self, TRANSFORMS, Topic};
@@ -164,6 +164,15 @@ pub(crate) fn precisions<'a>(
     };
     let rows: Vec<TruthSigma> = readings.map(of).map(shown).collect();
     rows.iter().any(|row| *row != TruthSigma::UNKNOWN).then_some(rows)
+}
+
+/// Takes the covariances of a filter for known up to one factor, and says so; nothing where it states none.
+pub(crate) fn scale_covariances(dataset: &mut Dataset, topic: &str) -> Option<String> {
+    dataset.runs.iter().find(|run| run.truth_sigma.is_some())?;
+    dataset.truth_noise.covariance_scale = CovarianceScale::Common;
+    Some(format!(
+        "topic {topic}: covariances of a filter are relative weights; one factor of them is estimated (covariance_scale = \"common\" under [truth])"
+    ))
 }
 
 /// What is doubtful of the covariances, for the user.

@@ -16,7 +16,7 @@ use crate::error::{DatasetError, shown};
 use crate::identity::{parse_recorded, parse_robot_id};
 use crate::map_distortion::MapDistortion;
 use crate::partial::GyroNoise;
-use crate::record::{MarkedPoint, NominalRobot, Protocol, Provenance, RunInfo, TruthNoise};
+use crate::record::{CovarianceScale, MarkedPoint, NominalRobot, Protocol, Provenance, RunInfo, TruthNoise};
 use crate::settings::MANIFEST_LIMIT_BYTES;
 use crate::table::open_file;
 
@@ -77,6 +77,8 @@ struct TruthToml {
     map_sigma_xy_m: Option<Spanned<f64>>,
     map_sigma_theta_rad: Option<Spanned<f64>>,
     map_length_m: Option<Spanned<f64>>,
+    #[serde(default)]
+    covariance_scale: CovarianceScale,
 }
 
 #[derive(Deserialize, Default)]
@@ -185,6 +187,7 @@ impl Source<'_> {
         let recorded = toml.recorded.map(|recorded| self.recorded(&recorded)).transpose()?;
         let robot = self.robot(robot_toml)?;
         let truth_noise = TruthNoise {
+            covariance_scale: toml.truth.covariance_scale,
             map: self.map_distortion(&toml.truth)?,
             sigma_xy_m: self.sigma("sigma_xy_m", toml.truth.sigma_xy_m)?,
             sigma_theta_rad: self.sigma("sigma_theta_rad", toml.truth.sigma_theta_rad)?,

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::partial::GyroNoise;
 use crate::read::FORMAT;
-use crate::record::{Dataset, NominalRobot, Protocol, ProtocolSettings, Provenance, RunInfo};
+use crate::record::{CovarianceScale, Dataset, NominalRobot, Protocol, ProtocolSettings, Provenance, RunInfo};
 
 #[derive(Serialize)]
 struct ManifestOut<'a> {
@@ -50,6 +50,8 @@ struct TruthOut {
     map_sigma_theta_rad: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     map_length_m: Option<f64>,
+    #[serde(skip_serializing_if = "CovarianceScale::is_separate")]
+    covariance_scale: CovarianceScale,
 }
 
 #[derive(Serialize)]
@@ -131,6 +133,7 @@ pub(crate) fn to_toml(dataset: &Dataset, runs: &[RunInfo]) -> Result<String, tom
             map_sigma_xy_m: dataset.truth_noise.map.map(|map| map.sigma_xy_m),
             map_sigma_theta_rad: dataset.truth_noise.map.map(|map| map.sigma_theta_rad),
             map_length_m: dataset.truth_noise.map.map(|map| map.length_m),
+            covariance_scale: dataset.truth_noise.covariance_scale,
         },
         gyro: GyroOut::of(dataset.truth_noise.gyro),
         run: runs.iter().map(RunOut::new).collect(),

@@ -40,3 +40,13 @@ pub(crate) const WALL_START_STEPS: usize = 10;
 /// Distance below which the direction between two places is not known, metres.
 /// Budgeted: far below what a tape measure shows.
 pub(crate) const MIN_DISTANCE_M: f64 = 1e-6;
+
+/// Standard deviation of the position at the start of a run with partial measurements beside poses, before
+/// any pose is taken, metres.
+/// Budgeted: a thousand times that of instruments, so that nothing is said of it, and far from where the
+/// rounding of numbers shows in millimetres.
+pub(crate) const START_POSITION_SIGMA_M: f64 = 10.0;
+
+/// The same of the heading, radians.
+/// Budgeted: as above; a heading that is not measured starts where the poses' own fit has it.
+pub(crate) const START_HEADING_SIGMA_RAD: f64 = 1.0;

@@ -11,7 +11,9 @@ use crate::settings::MIN_PARALLEL_WORK;
 use crate::{Column, Model, ModelFit, Noise, Pass, Records, Selection, Thinning};
 
 mod correlated;
+mod covariance_scale;
 mod partial;
+mod partial_poses;
 mod path_shape;
 mod rounding;
 mod selection;

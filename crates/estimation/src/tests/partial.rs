@@ -12,11 +12,11 @@ use crate::pass::pass;
 use crate::pass_options::{OutlierGate, PassOptions};
 use crate::{Column, FitSettings, Model, ModelFit, Noise, NormalEquations, Records, Selection, Thinning};
 
-const M_PER_RAD: Wheels<f64> = Wheels { left: 0.0811, right: 0.0797 };
-const SEPARATION_M: f64 = 0.366;
-const SIGMA_M: f64 = 2e-3;
-const SIGMA_RAD: f64 = 1e-3;
-const BIAS_RADPS: f64 = 0.013;
+pub(super) const M_PER_RAD: Wheels<f64> = Wheels { left: 0.0811, right: 0.0797 };
+pub(super) const SEPARATION_M: f64 = 0.366;
+pub(super) const SIGMA_M: f64 = 2e-3;
+pub(super) const SIGMA_RAD: f64 = 1e-3;
+pub(super) const BIAS_RADPS: f64 = 0.013;
 
 /// Turns of the wheels in a row of 0.1 s: standing, a straight, standing, a whole turn on the spot to the
 /// left, standing, an arc.
@@ -55,7 +55,7 @@ fn run(number: u32) -> (Run, Vec<Pose>) {
 }
 
 /// Runs with what `add` measures of them; without a gyroscope where it has no noise.
-fn dataset(gyro: GyroNoise, add: impl Fn(&mut Run, &[Pose])) -> Dataset {
+pub(super) fn dataset(gyro: GyroNoise, add: impl Fn(&mut Run, &[Pose])) -> Dataset {
     let runs = (0..4).map(|number| {
         let (mut run, poses) = run(number);
         if gyro.noise_rad_per_sqrt_s.is_none() {
@@ -67,15 +67,15 @@ fn dataset(gyro: GyroNoise, add: impl Fn(&mut Run, &[Pose])) -> Dataset {
     Dataset { truth_noise: TruthNoise { gyro, ..TruthNoise::default() }, runs: runs.collect(), ..super::dataset(false) }
 }
 
-const NO_GYRO: GyroNoise = GyroNoise {
+pub(super) const NO_GYRO: GyroNoise = GyroNoise {
     scale_sigma: None,
     noise_rad_per_sqrt_s: None,
     bias_walk_radps_per_sqrt_s: None,
     is_instantaneous: false,
 };
-const GYRO: GyroNoise = GyroNoise { noise_rad_per_sqrt_s: Some(2e-4), ..NO_GYRO };
+pub(super) const GYRO: GyroNoise = GyroNoise { noise_rad_per_sqrt_s: Some(2e-4), ..NO_GYRO };
 
-fn revisit(run: &mut Run, poses: &[Pose], [from, to]: [usize; 2], off: f64) {
+pub(super) fn revisit(run: &mut Run, poses: &[Pose], [from, to]: [usize; 2], off: f64) {
     let moved = poses[from].to(poses[to]);
     run.revisits.push(Revisit {
         t0_s: run.odometry.t_s[from],
@@ -88,7 +88,7 @@ fn revisit(run: &mut Run, poses: &[Pose], [from, to]: [usize; 2], off: f64) {
     });
 }
 
-fn tape(run: &mut Run, poses: &[Pose], [from, to]: [usize; 2], off: f64) {
+pub(super) fn tape(run: &mut Run, poses: &[Pose], [from, to]: [usize; 2], off: f64) {
     run.distances.push(TapeDistance {
         t0_s: run.odometry.t_s[from],
         t1_s: run.odometry.t_s[to],
@@ -98,7 +98,7 @@ fn tape(run: &mut Run, poses: &[Pose], [from, to]: [usize; 2], off: f64) {
 }
 
 /// A wall whose points have y = 2 m + x/10 or so, on the left of who drives ahead.
-fn wall(run: &mut Run, poses: &[Pose], row: usize, parts: [bool; 2], off: f64) {
+pub(super) fn wall(run: &mut Run, poses: &[Pose], row: usize, parts: [bool; 2], off: f64) {
     let direction_rad = 0.1_f64;
     let (sin, cos) = direction_rad.sin_cos();
     let distance_m = 2.0 + sin * poses[row].x_m - cos * poses[row].y_m + off * SIGMA_M;
@@ -113,7 +113,7 @@ fn wall(run: &mut Run, poses: &[Pose], row: usize, parts: [bool; 2], off: f64) {
     });
 }
 
-fn equations(dataset: &Dataset, model: &Model, noise: &Noise) -> NormalEquations {
+pub(super) fn equations(dataset: &Dataset, model: &Model, noise: &Noise) -> NormalEquations {
     let records = Records::of(&[dataset.session()]);
     let nominal = Model::of(&dataset.robot.geometry().expect("valid"), 0);
     let selections = Selection::of(&records, Thinning::NONE, &nominal);
@@ -123,11 +123,11 @@ fn equations(dataset: &Dataset, model: &Model, noise: &Noise) -> NormalEquations
     total(&found.runs).expect("runs")
 }
 
-fn nominal() -> Model {
+pub(super) fn nominal() -> Model {
     Model::of(&super::dataset(false).robot.geometry().expect("valid"), 0)
 }
 
-fn noise() -> Noise {
+pub(super) fn noise() -> Noise {
     Noise { variance: [1e-6, 4e-6, SIGMA_M * SIGMA_M, SIGMA_RAD * SIGMA_RAD], timing_s2: 0.0 }
 }
 
@@ -172,7 +172,7 @@ fn displacement(of: Revisit) -> Displacement {
 }
 
 /// Everything at once, overlapping in time.
-fn all(run: &mut Run, poses: &[Pose]) {
+pub(super) fn all(run: &mut Run, poses: &[Pose]) {
     revisit(run, poses, [0, 150], 0.5);
     revisit(run, poses, [100, 280], -0.8);
     tape(run, poses, [20, 120], 0.4);
@@ -227,19 +227,19 @@ fn the_score_of_the_noise_is_that_of_the_cost() {
     }
 }
 
-fn fitted(dataset: &Dataset) -> ModelFit<'_> {
+pub(super) fn fitted(dataset: &Dataset) -> ModelFit<'_> {
     FitSettings::CALIBRATION.fit(&[dataset.session()]).expect("a fit")
 }
 
 /// Relative errors of the wheels and the separation.
-fn errors(fit: &ModelFit<'_>) -> [f64; 3] {
+pub(super) fn errors(fit: &ModelFit<'_>) -> [f64; 3] {
     let Model { m_per_rad, separation_m, .. } = fit.solution.model;
     [m_per_rad.left / M_PER_RAD.left, m_per_rad.right / M_PER_RAD.right, separation_m / SEPARATION_M]
         .map(|ratio| ratio - 1.0)
 }
 
 /// What interpolation and priors leave of a noiseless log: a tenth of a millimetre over a metre.
-const NOISELESS: f64 = 1e-4;
+pub(super) const NOISELESS: f64 = 1e-4;
 
 #[test]
 fn straights_by_tape_and_a_whole_turn_that_is_come_back_from_determine_the_robot() {

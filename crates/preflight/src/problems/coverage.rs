@@ -48,9 +48,9 @@ fn net(angles: &[f64]) -> f64 {
     angles.last().zip(angles.first()).map_or(0.0, |(last, first)| last - first)
 }
 
-/// Partial measurements of runs that have poses or displacements too.
+/// Partial measurements of runs that have displacements too.
 pub(crate) fn unused(check: &mut SessionCheck) {
-    let is_idle = |run: &&RunLog| !run.partial.is_empty() && !run.is_seen_in_part();
+    let is_idle = |run: &&RunLog| !run.partial.is_empty() && !run.displacements.is_empty();
     let idle: Vec<&RunLog> = check.runs.iter().filter(is_idle).collect();
     if idle.is_empty() {
         return;
