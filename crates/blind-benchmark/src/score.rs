@@ -73,13 +73,13 @@ pub(crate) fn score(number: u64, case: &Case, scope: Scope) -> Result<CaseResult
     Ok(result)
 }
 
-/// What the tool's model gains on the held-out log over its calibration without what it found, and what the true
-/// terms gain there over the best calibration without the effect: all of it but the random part of an effect,
-/// which nobody can know before. Both models of the tool have the errors of one calibration from the same data;
-/// what it gains is no more than what can be gained. Measurements without error: on average over their errors the
-/// log score differs by these. Only means gain. A tool that says nothing gains nothing. The held-out log has one
-/// clock and true stamps, so that a model which rightly has a latency or a drift would lose there: such cases gain
-/// nothing.
+/// What the tool's model gains on the held-out log over its calibration without what it found, and what the
+/// true terms gain there over the best calibration without the effect: all of it but the random part of an
+/// effect, which nobody can know before. Both models of the tool have the errors of one calibration from the
+/// same data; what it gains is no more than what can be gained. Measurements without error: on average over
+/// their errors the log score differs by these. Only means gain. A tool that says nothing gains nothing. The
+/// held-out log has one clock and true stamps, so that a model which rightly has a latency or a drift would
+/// lose there: such cases gain nothing.
 fn gain(case: &Case, diagnosis: Option<&Diagnosis>) -> Result<Option<[f64; 2]>, ChallengeError> {
     let mean = case.oracle.iter().all(|hidden| kind_of(&hidden.id) == Some(EffectKind::Mean));
     let (Some((held_out, plain)), Some(best), Some(truth)) = (&case.held_out, &case.best_drive, case.truth()) else {

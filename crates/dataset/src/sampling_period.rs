@@ -18,8 +18,8 @@ const ROUNDS: usize = 5;
 /// Share of the beat by which gaps that are whole numbers of it depart at the most.
 const MAX_WHOLE_GAP_ERROR: f64 = 0.05;
 /// Spans of so many rows whose phases say the beat, within these shares of what was known before, and in how
-/// many steps: a fifth of the rows may be lost at first, or have come by themselves; then three times what a span
-/// before leaves open.
+/// many steps: a fifth of the rows may be lost at first, or have come by themselves; then three times what a
+/// span before leaves open.
 const PHASE_SPANS: [(usize, [f64; 2], u32); 4] =
     [(2, [0.8, 1.2], 80), (8, [0.97, 1.03], 24), (23, [0.99, 1.01], 20), (100, [0.9975, 1.0025], 20)];
 /// A run has as many spans one after the other at the least, so that a beat that begins anew spoils few.

@@ -25,8 +25,8 @@ pub(crate) struct StampError {
     pub(crate) is_undone_roughly: bool,
     /// Log Bayes factor of it as a linear term, or of the records without it, over none.
     pub(crate) log_odds: f64,
-    /// Cost of the model that has it as a linear term, or of the fit to the records without it, its number of observations, and by how much it costs
-    /// less than the model without.
+    /// Cost of the model that has it as a linear term, or of the fit to the records without it, its number of
+    /// observations, and by how much it costs less than the model without.
     cost: f64,
     count: f64,
     explains: f64,
@@ -76,9 +76,9 @@ pub(crate) fn stamp_error(datasets: &[Dataset], base: &ModelFit<'_>, catalogue: 
     found.max_by(|a, b| a.test.statistic.total_cmp(&b.test.statistic))
 }
 
-/// An error of stamps that do not tell of which tick each row is, as of rows that wait for each other: speeds by
-/// such stamps are nothing that a linear term could be made of. The records on their beat are compared with the
-/// records as they are, to which `base` is fitted.
+/// An error of stamps that do not tell of which tick each row is, as of rows that wait for each other: speeds
+/// by such stamps are nothing that a linear term could be made of. The records on their beat are compared
+/// with the records as they are, to which `base` is fitted.
 pub(crate) fn whole_stamp_error(
     datasets: &[Dataset],
     base: &ModelFit<'_>,

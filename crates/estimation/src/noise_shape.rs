@@ -96,7 +96,8 @@ impl NoiseShape {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CorrelatedErrors {
     shape: NoiseShape,
-    /// One standard deviation of the instant times the velocity of the instrument in the room: metres, radians.
+    /// One standard deviation of the instant times the velocity of the instrument in the room: metres,
+    /// radians.
     by_instant: Vector3<f64>,
 }
 

@@ -393,8 +393,8 @@ impl<C: Count, S: Sink> Walk<'_, C, S> {
     }
 
     /// A block of which `used` steps are steps. Its displacements are found while the block before is placed
-    /// and its poses are written, group by group: the memory writes while the processor computes. `upcoming` are
-    /// the counts whose memory is asked for meanwhile.
+    /// and its poses are written, group by group: the memory writes while the processor computes. `upcoming`
+    /// are the counts whose memory is asked for meanwhile.
     #[inline(always)]
     fn block(&mut self, columns: &mut Columns, (counts, upcoming): (Wheels<&[[C; GROUP]]>, Wheels<&[C]>), used: usize) {
         let (mut before, mut is_within) = (self.state.counts, true);

@@ -261,7 +261,7 @@ pub(crate) const MIN_GAP_RATIO: f64 = 1.8;
 /// Tuned: by hand, on single cases of the blind benchmark with stamps of receipt, which lose 2.5 %.
 pub(crate) const MAX_RESTAMPING_LOSS: f64 = 0.05;
 
-/// Log odds that records on their beat must have over the records as they are, where no linear term shows that
-/// stamps are wrong.
+/// Log odds that records on their beat must have over the records as they are, where no linear term shows
+/// that stamps are wrong.
 /// Budgeted: one in 20,000, beside some dozens of other questions to a log.
 pub(crate) const MIN_WHOLE_RESTAMPING_LOG_ODDS: f64 = 10.0;

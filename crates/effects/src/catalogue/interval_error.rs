@@ -139,10 +139,10 @@ fn restamped(dataset: &Dataset, share: f64, sigma: f64) -> Option<Dataset> {
     has_beat.then_some(records)
 }
 
-/// When rows were read that have these stamps, and which rows say when. A row of a tick was read nearer to the
-/// beat by the false share. Of several rows of one tick the nearest is the tick's; the others came by themselves,
-/// with no beat to say when but their stamps. Where stamps are later than a tick can be told by, none of them
-/// says when.
+/// When rows were read that have these stamps, and which rows say when. A row of a tick was read nearer to
+/// the beat by the false share. Of several rows of one tick the nearest is the tick's; the others came by
+/// themselves, with no beat to say when but their stamps. Where stamps are later than a tick can be told by,
+/// none of them says when.
 fn read_times(stamps_s: &[f64], share: f64, sigma: f64) -> Option<(Vec<f64>, Vec<bool>)> {
     if share <= 0.0 {
         return None;

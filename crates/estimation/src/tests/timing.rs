@@ -77,8 +77,8 @@ fn noisy_instants_are_told_from_noisy_poses() {
     assert!(!fit.has_timing_noise(), "what was found is left over");
 }
 
-/// Of exact instants the score is standard normal: over 20 logs its mean is within 1/√20 and its variance within
-/// √(2/19), three of each here.
+/// Of exact instants the score is standard normal: over 20 logs its mean is within 1/√20 and its variance
+/// within √(2/19), three of each here.
 #[test]
 fn the_score_of_exact_instants_is_standard_normal() {
     let z: Vec<f64> = (0..20)
@@ -93,8 +93,8 @@ fn the_score_of_exact_instants_is_standard_normal() {
     assert!(mean.abs() < 3.0 / 20_f64.sqrt() && (variance - 1.0).abs() < 3.0 * (2.0_f64 / 19.0).sqrt(), "{z:?}");
 }
 
-/// As [`the_noise_score_is_the_derivative_of_the_cost`], with its tolerance: errors along the velocity correlate
-/// the components.
+/// As [`the_noise_score_is_the_derivative_of_the_cost`], with its tolerance: errors along the velocity
+/// correlate the components.
 #[test]
 fn the_noise_score_beside_noisy_instants_is_the_derivative_of_the_cost() {
     let dataset = dataset(true);
