@@ -21,6 +21,7 @@ mod pose_covariance;
 mod prefetch;
 mod read;
 mod record;
+mod retained_rows;
 mod row_lengths;
 mod sampling_period;
 mod session;
