@@ -15,7 +15,7 @@ impl Odometry {
         retain(&mut self.t_s, keep);
         match &mut self.wheels {
             WheelLog::Ticks(Wheels { left, right }) => {
-                [left, right].into_iter().for_each(|column| retain(column, keep))
+                [left, right].into_iter().for_each(|column| retain(column, keep));
             }
             WheelLog::Angles(Wheels { left, right })
             | WheelLog::Speeds(Wheels { left, right })
