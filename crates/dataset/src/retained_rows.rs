@@ -5,8 +5,8 @@ use kinematics::Wheels;
 use crate::record::{Odometry, WheelLog};
 
 impl Odometry {
-    /// Leaves the rows out that are not to be kept; of cumulative wheels nothing of the motion is lost with them.
-    /// `keep` is as long as [`Self::t_s`].
+    /// Leaves the rows out that are not to be kept. Of cumulative wheels nothing of the motion is lost with
+    /// them. `keep` is as long as [`Self::t_s`].
     pub fn retain_rows(&mut self, keep: &[bool]) {
         fn retain<T>(column: &mut Vec<T>, keep: &[bool]) {
             let mut kept = keep.iter();
