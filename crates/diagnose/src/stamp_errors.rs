@@ -40,9 +40,10 @@ impl StampError {
     }
 }
 
-/// Whether stamps do not tell of which tick each row of a run is.
-fn has_uncertain_rows(run: &Run) -> bool {
-    SamplingPeriod::of(&run.odometry.t_s).is_some_and(|period| !period.is_certain())
+/// Whether stamps do not tell in some run of which tick each row is.
+fn have_uncertain_rows(datasets: &[Dataset]) -> bool {
+    let is_uncertain = |run: &Run| SamplingPeriod::of(&run.odometry.t_s).is_some_and(|period| !period.is_certain());
+    datasets.iter().flat_map(|dataset| &dataset.runs).any(is_uncertain)
 }
 
 /// The most significant error of the stamps that restamping undoes, if it is significant among all of the
@@ -66,7 +67,7 @@ pub(crate) fn stamp_error(datasets: &[Dataset], base: &ModelFit<'_>, catalogue: 
             candidate: candidate.clone(),
             test,
             records: records.collect(),
-            is_undone_roughly: datasets.iter().flat_map(|dataset| &dataset.runs).any(has_uncertain_rows),
+            is_undone_roughly: have_uncertain_rows(datasets),
             log_odds,
             cost,
             count,
@@ -84,16 +85,18 @@ pub(crate) fn whole_stamp_error(
     base: &ModelFit<'_>,
     catalogue: &[Candidate],
 ) -> Option<StampError> {
-    if base.thinning != Thinning::NONE || !datasets.iter().flat_map(|dataset| &dataset.runs).any(has_uncertain_rows) {
+    if base.thinning != Thinning::NONE || !have_uncertain_rows(datasets) {
         return None;
     }
     let found = catalogue.iter().filter_map(|candidate| {
         let restamped = candidate.restamped()?;
         let records: Option<Vec<Dataset>> = datasets.iter().map(|dataset| restamped(dataset, 1.0, 0.0)).collect();
         let records = records?;
-        let fit = FitSettings::GEOMETRY_ONLY.fit(&sessions(&records)).ok()?;
-        let count = count(base).max(count(&fit));
-        let cost_on_beat = cost(&fit, count);
+        let (count, cost_on_beat) = {
+            let fit = FitSettings::GEOMETRY_ONLY.fit(&sessions(&records)).ok()?;
+            let most = count(base).max(count(&fit));
+            (most, cost(&fit, most))
+        };
         let explains = cost(base, count) - cost_on_beat;
         let log_odds = explains - (catalogue.len() as f64).ln();
         if log_odds < MIN_WHOLE_RESTAMPING_LOG_ODDS {
@@ -102,7 +105,6 @@ pub(crate) fn whole_stamp_error(
         let statistic = 2.0 * explains;
         let estimates = vec![(1.0, statistic.sqrt().recip())];
         let test = Test { statistic, p_value: p_of_chi_square(statistic, 1.0), estimates };
-        drop(fit);
         Some(StampError {
             candidate: candidate.clone(),
             test,
