@@ -8,6 +8,8 @@
 mod column_names;
 mod corrections;
 mod counter;
+#[cfg(test)]
+mod draws;
 mod error;
 mod fingerprint;
 mod identity;
@@ -20,6 +22,7 @@ mod partial;
 mod pose_covariance;
 mod prefetch;
 mod read;
+mod receipt_delays;
 mod record;
 mod retained_rows;
 mod row_lengths;

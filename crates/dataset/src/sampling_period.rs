@@ -7,6 +7,8 @@
 //! itself, and what waited behind it. The numbers are the likeliest path through both (Viterbi 1967), each
 //! path with its own idea of how late rows usually are, so that a clock need not keep one beat all day.
 
+use crate::receipt_delays::Received;
+
 /// Rows from which on a log has a beat: the line through so many is off by a fifth of what stamps jitter by.
 const MIN_ROWS: usize = 24;
 /// Rows to either side whose line is the beat: 500 rows know it to a twentieth of what stamps jitter by, and
@@ -39,14 +41,8 @@ const FURTHER_LOST_COST: f64 = 2.0;
 const PAUSE_COST: f64 = 14.0;
 /// The same against a row that came by itself.
 const BY_ITSELF_COST: f64 = 10.0;
-/// Rows that are late together, for each beat by which stamps jitter.
-const WAITING_ROWS: f64 = 8.0;
 /// Deviations beyond which an error costs in proportion to its size (Huber 1964).
 const HUBER_SIGMAS: f64 = 1.5;
-/// A gap of less of the beat is between rows that waited for each other; rows come in bunches where more than
-/// this share of the gaps is such.
-const BUNCHED_GAP: f64 = 0.2;
-const MIN_BUNCHED_SHARE: f64 = 0.1;
 /// Where stamps are later than that share of the beat, root mean square, some numbers of rows are wrong.
 const MAX_CERTAIN_LATENESS: f64 = 0.25;
 /// Share of the beat by which stamps are held to jitter at the least: what rounded file formats leave.
@@ -59,8 +55,11 @@ pub struct SamplingPeriod {
     pub period_s: f64,
     /// For each row, which tick it is of; 0 for the first.
     pub numbers: Vec<i64>,
-    /// For each row, how late its stamp is, seconds, against the line through the rows around it.
+    /// For each row, how late its stamp is, seconds: against the line through the rows around it; where rows
+    /// hold up each other, against when it was read.
     pub late_s: Vec<f64>,
+    /// Whether rows come in bunches: they are stamped on receipt, and one that is late holds up those behind it.
+    pub is_bunched: bool,
 }
 
 impl SamplingPeriod {
@@ -69,6 +68,10 @@ impl SamplingPeriod {
     pub fn of(t_s: &[f64]) -> Option<Self> {
         if t_s.len() < MIN_ROWS {
             return None;
+        }
+        if let Some(received) = Received::of(t_s) {
+            let late_s = t_s.iter().zip(&received.read_s).map(|(t_s, read_s)| t_s - read_s).collect();
+            return Some(Self { period_s: received.period_s, numbers: received.numbers(), late_s, is_bunched: true });
         }
         let gap_s = median(t_s.windows(2).map(|pair| pair[1] - pair[0]).collect())?;
         // The middle gap is exact where stamps are.
@@ -81,7 +84,7 @@ impl SamplingPeriod {
             }
         };
         let late_s = lateness(t_s, &numbers, period_s);
-        Some(Self { period_s, numbers, late_s })
+        Some(Self { period_s, numbers, late_s, is_bunched: false })
     }
 
     /// Whether stamps are near enough to the beat that the numbers of all rows are right.
@@ -207,17 +210,12 @@ fn step_cost(ticks: i64) -> f64 {
     }
 }
 
-/// Standard deviation of stamps, in beats: by second differences, of which the middle one has no lost rows;
-/// by all gaps where rows come in bunches.
+/// Standard deviation of stamps, in beats: by second differences, of which the middle one has no lost rows.
 fn jitter(t_s: &[f64], period_s: f64) -> f64 {
     let second = t_s.windows(3).map(|three| (three[2] - 2.0 * three[1] + three[0]).abs() / period_s).collect();
     // Second differences of independent normal errors have √6 times their standard deviation, gaps √2 times.
     let of_second = median(second).unwrap_or(0.0) / (0.674_49 * 6_f64.sqrt());
-    let gaps = || t_s.windows(2).map(|pair| (pair[1] - pair[0]) / period_s);
-    let rows = (t_s.len() - 1) as f64;
-    let bunched = gaps().filter(|gap| *gap < BUNCHED_GAP).count() as f64 > MIN_BUNCHED_SHARE * rows;
-    let of_gaps = (gaps().map(|gap| (gap - 1.0).powi(2)).sum::<f64>() / (2.0 * rows)).sqrt();
-    of_second.max(if bunched { of_gaps } else { 0.0 }).max(MIN_JITTER)
+    of_second.max(MIN_JITTER)
 }
 
 /// The numbers by the likeliest path, and its cost: that of one beat over another one's counts the densities
@@ -225,8 +223,6 @@ fn jitter(t_s: &[f64], period_s: f64) -> f64 {
 fn likeliest_numbers(t_s: &[f64], period_s: f64) -> (Vec<i64>, f64) {
     let at = |row: usize| (t_s[row] - t_s[0]) / period_s;
     let jitter = jitter(t_s, period_s);
-    // Rows that wait for each other are late together: so many say the same of one that is missing.
-    let together = (WAITING_ROWS * jitter).max(1.0);
     // The first row may be late itself.
     let usual = median((0..FIRST_ROWS).map(|row| at(row) - row as f64).collect()).unwrap_or(0.0);
     let mut rows: Vec<Vec<Path>> = vec![vec![Path { number: 0, cost: 0.0, usual, from: 0 }]];
@@ -242,16 +238,16 @@ fn likeliest_numbers(t_s: &[f64], period_s: f64) -> (Vec<i64>, f64) {
             for number in [path.number + 1, due.floor() as i64, due.ceil() as i64] {
                 if number > path.number {
                     let late = at(row) - number as f64 - path.usual;
-                    let cost = path.cost + together * step_cost(number - path.number) + huber(late / jitter);
+                    let cost = path.cost + step_cost(number - path.number) + huber(late / jitter);
                     let learnt = late.clamp(-2.0 * jitter, 2.0 * jitter) / MEMORY_ROWS.min(row as f64 + 1.0);
                     offer(Path { number, cost, usual: path.usual + learnt, from });
                 }
             }
             // A row that came by itself is of no tick, and as late as it likes.
-            offer(Path { cost: path.cost + together * BY_ITSELF_COST, from, ..path.to_owned() });
+            offer(Path { cost: path.cost + BY_ITSELF_COST, from, ..path.to_owned() });
             // The beat begins anew, as after a pause that is no whole number of ticks.
             let number = path.number + 1;
-            offer(Path { number, cost: path.cost + together * PAUSE_COST, usual: at(row) - number as f64, from });
+            offer(Path { number, cost: path.cost + PAUSE_COST, usual: at(row) - number as f64, from });
         }
         next.sort_by(|a, b| a.cost.total_cmp(&b.cost).then(a.number.cmp(&b.number)));
         next.truncate(PATHS);
@@ -325,23 +321,9 @@ impl Sums {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::draws::Draws;
 
     const PERIOD_S: f64 = 0.01;
-
-    /// Uniform draws in (0, 1): a multiplicative congruential generator (Park & Miller 1988).
-    struct Draws(u64);
-
-    impl Draws {
-        fn uniform(&mut self) -> f64 {
-            self.0 = self.0 * 48_271 % 2_147_483_647;
-            self.0 as f64 / 2_147_483_647.0
-        }
-
-        /// By the sum of twelve.
-        fn normal(&mut self) -> f64 {
-            (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
-        }
-    }
 
     /// Rows of which some are lost, late by draws; in order. Stamp, lateness and number of each.
     fn stamps(rows: i64, lost: f64, mut late_s: impl FnMut(&mut Draws) -> f64) -> Vec<(f64, f64, i64)> {

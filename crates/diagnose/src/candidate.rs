@@ -65,6 +65,14 @@ impl Candidate {
         }
     }
 
+    /// Its estimate by counts alone, where it is in the stamps alone.
+    pub(crate) fn shown_by_counts(&self) -> Option<effects::ShownByCounts> {
+        match self {
+            Self::Effect { id, .. } => effects::description(id)?.shown_by_counts,
+            Self::Sparse(_) => None,
+        }
+    }
+
     /// Whether it is of the outside instrument, and no part of the robot's motion.
     pub(crate) fn is_of_instrument(&self) -> bool {
         match self {

@@ -26,7 +26,7 @@ use crate::settings::records::{
     MAX_REJECTED_FRACTION, MIN_COMMON_CLOCK_OFFSET_S, MIN_MEASUREMENTS_PER_RUN, MIN_REJECTING_CLOCK_OFFSET_S,
 };
 use crate::stage::{OnStage, Step};
-use crate::stamp_errors::{stamp_error, whole_stamp_error};
+use crate::stamp_errors::{stamp_error, stamp_error_by_counts, whole_stamp_error, with_rows_of};
 use crate::text;
 use crate::unknown_motion::unknown_motions;
 
@@ -132,6 +132,11 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
 fn stages(datasets: &[Dataset], options: &Options, min_common_clock_s: f64) -> Result<Diagnosis, DiagnoseError> {
     let begins = |step| options.on_stage.begins(step);
     begins(Step::Motions);
+    let every_term = mean_terms(&options.without);
+    // Stamps that counts show to be wrong by themselves: all else is sought in records that are restamped.
+    let by_counts = stamp_error_by_counts(datasets, &every_term);
+    let recorded = datasets;
+    let datasets = by_counts.as_ref().map_or(datasets, |error| &error.records[..]);
     let clocks = clock_offsets(datasets, min_common_clock_s);
     let datasets = clocks.records.as_deref().unwrap_or(datasets);
     let odd = unknown_motions(datasets, clocks.remaining_s);
@@ -169,31 +174,34 @@ fn stages(datasets: &[Dataset], options: &Options, min_common_clock_s: f64) -> R
     };
     begins(Step::MeanStructure);
     let base = correlated_base(records, base);
-    let every_term = mean_terms(&options.without);
     // Stamps that are wrong: everything that comes from them is sought in records that are restamped.
-    let error = is_correlated(&base).then(|| stamp_error(records, &base, &every_term)).flatten();
-    let error = error.or_else(|| whole_stamp_error(records, &base, &every_term));
+    let sought = by_counts.is_none() && is_correlated(&base);
+    let error = sought.then(|| stamp_error(records, &base, &every_term)).flatten();
+    let whole = || by_counts.is_none().then(|| whole_stamp_error(records, &base, &every_term)).flatten();
+    let error = error.or_else(whole);
     let restamped = error.as_ref().and_then(|error| {
         let fit = correlated_base(&error.records, EVERY_MEASUREMENT.fit(&sessions(&error.records)).ok()?);
         error.is_undone_by(&fit).then_some((error, fit))
     });
+    let with_stamps = (by_counts.is_some() && faults.is_empty()).then(|| with_rows_of(records, recorded));
     let (stamps, as_stamped, records, base) = match restamped {
         Some((error, fit)) => (Some(error), Some((records, base)), &error.records[..], fit),
-        None => (None, None, records, base),
+        None => {
+            let fit_as_stamped = |records| Some((records, EVERY_MEASUREMENT.fit(&sessions(records)).ok()?));
+            (by_counts.as_ref(), with_stamps.as_deref().and_then(fit_as_stamped), records, base)
+        }
     };
     let is_open = |candidate: &Candidate| stamps.is_none_or(|error| error.candidate.id() != candidate.id());
     let mut catalogue: Vec<Candidate> = every_term.into_iter().filter(is_open).collect();
-    let restored =
-        faults.iter().any(|fault| fault.is_restored_roughly()) || stamps.is_some_and(|error| error.is_undone_roughly);
     let uncorrelated = (!is_correlated(&base)).then(|| base.clone());
-    let mut structure = mean_structure(records, base, &catalogue, restored);
+    let mut structure = mean_structure(records, base, &catalogue);
     // Where the counts do not follow the robot at all, no small effect has a meaning: only one with which
     // they follow it, such as a clock that is off.
     let uncorrelated = uncorrelated.filter(|_| !is_correlated(&structure.found.model.fit));
     let is_uncorrelated = uncorrelated.is_some();
     if let Some(base) = uncorrelated {
         catalogue.clear();
-        structure = mean_structure(records, base, &catalogue, restored);
+        structure = mean_structure(records, base, &catalogue);
     }
     let (log, spans) = (check_rows(records), check_spans(records));
     let model = structure.model();

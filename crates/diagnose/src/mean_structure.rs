@@ -81,12 +81,11 @@ impl<'a> MeanModel<'a> {
     }
 }
 
-/// Searches the mean model of a base fit. `restored`: lost counts were restored roughly.
+/// Searches the mean model of a base fit.
 pub(crate) fn mean_structure<'a>(
     datasets: &'a [Dataset],
     base: ModelFit<'a>,
     catalogue: &[Candidate],
-    restored: bool,
 ) -> MeanStructure<'a> {
     let (base, model) = search_beside_timing_noise(base, catalogue);
     // A large effect in few measurements looks like outliers: what a search among all measurements finds.
@@ -99,8 +98,7 @@ pub(crate) fn mean_structure<'a>(
         None => model,
     };
     let model = compare_with_sparse(&base, model);
-    let Decorrelated { base, model, correlated, spurious } =
-        thin_if_autocorrelated(datasets, base, model, catalogue, restored);
+    let Decorrelated { base, model, correlated, spurious } = thin_if_autocorrelated(datasets, base, model, catalogue);
     let model = if correlated.is_some() { compare_with_sparse(&base, model) } else { model };
     let model = search_if_dependent(&base, model, catalogue);
     let model = terms_if_dependent(&base, model);
@@ -175,11 +173,8 @@ fn thin_if_autocorrelated<'a>(
     base: ModelFit<'a>,
     model: MeanModel<'a>,
     catalogue: &[Candidate],
-    restored: bool,
 ) -> Decorrelated<'a> {
-    // Counts that were restored roughly make the errors of the measurements after them alike; the
-    // instrument has no part in it.
-    if model.unlisted.is_some() || restored || is_white(&model.checked) {
+    if model.unlisted.is_some() || is_white(&model.checked) {
         return Decorrelated { base, model, correlated: None, spurious: false };
     }
     let tried = sparse(&base, &model.found.model, SPARSE_TERM_LEVEL).map(|sparse| (check(&sparse.model), sparse));

@@ -11,7 +11,7 @@ use crate::candidate::Candidate;
 use crate::model_comparison::log_bayes_factor;
 use crate::record_faults::sessions;
 use crate::settings::levels::{CLUSTER_ROBUST_LEVEL, MIN_LOG_ODDS_MARGIN, SCAN_LEVEL};
-use crate::settings::records::{MAX_RESTAMPING_LOSS, MIN_WHOLE_RESTAMPING_LOG_ODDS};
+use crate::settings::records::{MAX_RESTAMPING_LOSS, MIN_SHARE_SIGMAS, MIN_WHOLE_RESTAMPING_LOG_ODDS};
 use crate::statistics::p_of_chi_square;
 use crate::wald::{Test, cluster_robust_test, wald_test};
 
@@ -25,18 +25,24 @@ pub(crate) struct StampError {
     pub(crate) is_undone_roughly: bool,
     /// Log Bayes factor of it as a linear term, or of the records without it, over none.
     pub(crate) log_odds: f64,
-    /// Cost of the model that has it as a linear term, or of the fit to the records without it, its number of
-    /// observations, and by how much it costs less than the model without.
+    /// How well a fit explains it; `None` where counts show it by themselves.
+    explained: Option<Explained>,
+}
+
+/// Cost of the model that has an error of the stamps as a linear term, or of the fit to the records without
+/// it, its number of observations, and by how much it costs less than the model without.
+struct Explained {
     cost: f64,
     count: f64,
-    explains: f64,
+    by: f64,
 }
 
 impl StampError {
     /// Whether the records without it are about as likely as those with it beside the linear term.
     pub(crate) fn is_undone_by(&self, restamped: &ModelFit<'_>) -> bool {
-        let most = self.count.max(count(restamped));
-        cost(restamped, most) <= self.cost + MIN_LOG_ODDS_MARGIN.max(MAX_RESTAMPING_LOSS * self.explains)
+        let Some(explained) = &self.explained else { return true };
+        let most = explained.count.max(count(restamped));
+        cost(restamped, most) <= explained.cost + MIN_LOG_ODDS_MARGIN.max(MAX_RESTAMPING_LOSS * explained.by)
     }
 }
 
@@ -44,6 +50,42 @@ impl StampError {
 fn have_uncertain_rows(datasets: &[Dataset]) -> bool {
     let is_uncertain = |run: &Run| SamplingPeriod::of(&run.odometry.t_s).is_some_and(|period| !period.is_certain());
     datasets.iter().flat_map(|dataset| &dataset.runs).any(is_uncertain)
+}
+
+/// An error of the stamps that counts show by themselves, whatever the instrument says.
+pub(crate) fn stamp_error_by_counts(datasets: &[Dataset], catalogue: &[Candidate]) -> Option<StampError> {
+    catalogue.iter().find_map(|candidate| {
+        let (restamped, shown_by_counts) = (candidate.restamped()?, candidate.shown_by_counts()?);
+        let (value, sigma) = shown_by_counts(datasets)?;
+        if value - MIN_SHARE_SIGMAS * sigma < 0.5 {
+            return None;
+        }
+        let each: Option<Vec<Dataset>> = datasets.iter().map(|dataset| restamped(dataset, value, sigma)).collect();
+        let statistic = (value / sigma).powi(2);
+        let p_value = p_of_chi_square(statistic, 1.0);
+        Some(StampError {
+            candidate: candidate.clone(),
+            test: Test { statistic, p_value, estimates: vec![(value, sigma)] },
+            records: each?,
+            is_undone_roughly: have_uncertain_rows(datasets),
+            log_odds: 0.5 * statistic - (catalogue.len() as f64).ln(),
+            explained: None,
+        })
+    })
+}
+
+/// Records with the stamps and counts of others of the same runs, as far as there are such.
+pub(crate) fn with_rows_of(records: &[Dataset], others: &[Dataset]) -> Vec<Dataset> {
+    let of = |dataset: &Dataset, other: &Dataset| {
+        let mut dataset = dataset.clone();
+        for run in &mut dataset.runs {
+            if let Some(other) = other.runs.iter().find(|other| other.info.id == run.info.id) {
+                run.odometry = other.odometry.clone();
+            }
+        }
+        dataset
+    };
+    records.iter().zip(others).map(|(dataset, other)| of(dataset, other)).collect()
 }
 
 /// The most significant error of the stamps that restamping undoes, if it is significant among all of the
@@ -69,9 +111,7 @@ pub(crate) fn stamp_error(datasets: &[Dataset], base: &ModelFit<'_>, catalogue: 
             records: records.collect(),
             is_undone_roughly: have_uncertain_rows(datasets),
             log_odds,
-            cost,
-            count,
-            explains: without - cost,
+            explained: Some(Explained { cost, count, by: without - cost }),
         })
     });
     found.max_by(|a, b| a.test.statistic.total_cmp(&b.test.statistic))
@@ -111,10 +151,8 @@ pub(crate) fn whole_stamp_error(
             records,
             is_undone_roughly: true,
             log_odds,
-            cost: cost_on_beat,
-            count,
-            explains,
+            explained: Some(Explained { cost: cost_on_beat, count, by: explains }),
         })
     });
-    found.max_by(|a, b| a.explains.total_cmp(&b.explains))
+    found.max_by(|a, b| a.log_odds.total_cmp(&b.log_odds))
 }

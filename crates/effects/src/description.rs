@@ -30,6 +30,8 @@ pub struct Description {
     pub goes_by_rows: bool,
     /// The records with the stamps that they would have without it; of effects that are in the stamps alone.
     pub restamped: Option<Restamped>,
+    /// The estimate of its only parameter by the counts alone; of effects that are in the stamps alone.
+    pub shown_by_counts: Option<ShownByCounts>,
     /// Its parameter that is an offset of the instrument's clock, seconds; `None` where it has none.
     pub clock_offset: Option<&'static str>,
     /// What of the instrument's mounting on the robot it changes; `None` where it changes none.
@@ -46,6 +48,10 @@ pub struct Description {
 /// The records of a dataset without an error of their stamps, by its only parameter's estimate and standard
 /// deviation; `None` where the stamps are not what is wrong, or cannot be told.
 pub type Restamped = fn(&Dataset, f64, f64) -> Option<Dataset>;
+
+/// The estimate of an effect's only parameter by the counts of a robot's records, and its standard deviation;
+/// `None` where they do not show it by themselves.
+pub type ShownByCounts = fn(&[Dataset]) -> Option<(f64, f64)>;
 
 /// A part of the instrument's mounting on the robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -78,6 +84,7 @@ impl Description {
             record_fault: RecordFault::WITH_A_TRACE,
             goes_by_rows: false,
             restamped: None,
+            shown_by_counts: None,
             clock_offset: None,
             extrinsic: None,
             geometry: None,

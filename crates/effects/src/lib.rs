@@ -31,7 +31,7 @@ pub use benchmark::{Benchmark, FormOf, HostRobot, Needs, OtherForm, ParameterLaw
 pub use channel::Channel;
 pub use covariate::Covariate;
 pub use description::{
-    Description, Excitation, Extrinsic, GeometryRatio, IsolatedError, RecordFault, Restamped, Summary,
+    Description, Excitation, Extrinsic, GeometryRatio, IsolatedError, RecordFault, Restamped, ShownByCounts, Summary,
 };
 pub use effect::{EffectError, PhysicalEffect};
 pub use estimates::{Estimate, Estimates};

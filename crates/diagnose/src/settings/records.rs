@@ -265,3 +265,8 @@ pub(crate) const MAX_RESTAMPING_LOSS: f64 = 0.05;
 /// that stamps are wrong.
 /// Budgeted: one in 20,000, beside some dozens of other questions to a log.
 pub(crate) const MIN_WHOLE_RESTAMPING_LOG_ODDS: f64 = 10.0;
+
+/// Standard deviations. Stamps are wrong by more than half of their irregularity, by counts alone, if the
+/// share is above a half by more.
+/// Derived: a normal deviation of as much has a probability of 0.001.
+pub(crate) const MIN_SHARE_SIGMAS: f64 = 3.0;

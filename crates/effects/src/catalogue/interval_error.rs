@@ -79,6 +79,7 @@ impl PhysicalEffect for IntervalError {
             excitation: Excitation::Conditions("log at intervals that differ"),
             goes_by_rows: true,
             restamped: Some(restamped),
+            shown_by_counts: Some(share_by_counts),
             benchmark: Benchmark {
                 needs: Needs { jitter: true, ..Needs::NONE },
                 // A share of one is all there is.
@@ -175,6 +176,69 @@ fn read_times(stamps_s: &[f64], share: f64, sigma: f64) -> Option<(Vec<f64>, Vec
     Some((stamps_s.iter().zip(&late_s).map(read).collect(), says))
 }
 
+/// Rows to either side whose counts say how fast a wheel turns, at the least; further ones where stamps are
+/// late by more beats, for which these are few.
+const RATE_ROWS: usize = 10;
+/// Times by which a row counts more than the middle one at the most: a counter that wraps counts otherwise.
+const MAX_COUNT_RATIO: f64 = 20.0;
+/// A share is known by counts to no better: the beat is found from the same stamps.
+const MIN_SHARE_SIGMA: f64 = 0.05;
+
+/// The share by what is counted in rows that hold up each other: a row that comes on the heels of another has
+/// counted a whole beat if it was read on the beat, and next to nothing if it was read when it was stamped.
+fn share_by_counts(datasets: &[Dataset]) -> Option<(f64, f64)> {
+    let runs = datasets.iter().flat_map(|dataset| &dataset.runs).filter(|run| run.info.continuous);
+    let mut rows: Vec<(f64, f64)> = Vec::new();
+    for run in runs {
+        let stamps_s = &run.odometry.t_s;
+        let Some(period) = SamplingPeriod::of(stamps_s).filter(|period| period.is_bunched) else { continue };
+        let read_s: Vec<f64> = stamps_s.iter().zip(&period.late_s).map(|(stamp_s, late_s)| stamp_s - late_s).collect();
+        match &run.odometry.wheels {
+            WheelLog::Ticks(ticks) => {
+                for column in [&ticks.left, &ticks.right] {
+                    let counts: Vec<f64> = column.iter().map(|count| *count as f64).collect();
+                    rows.extend(counted_rows(stamps_s, &read_s, &counts, period.period_s));
+                }
+            }
+            WheelLog::Angles(angles) => {
+                for column in [&angles.left, &angles.right] {
+                    rows.extend(counted_rows(stamps_s, &read_s, column, period.period_s));
+                }
+            }
+            WheelLog::Speeds(_) | WheelLog::Twist { .. } => {}
+        }
+    }
+    let (xx, xy) = rows.iter().fold((0.0, 0.0), |(xx, xy), (x, y)| (xx + x * x, xy + x * y));
+    let share = xy / xx;
+    let left = rows.iter().map(|(x, y)| (y - share * x).powi(2)).sum::<f64>() / rows.len() as f64;
+    let sigma = (left / xx).sqrt();
+    (share.is_finite() && sigma.is_finite()).then(|| (share, sigma.max(MIN_SHARE_SIGMA)))
+}
+
+/// For each row, what it would have counted more if it was read on the beat, and what it has, both over what
+/// it would have counted if it was read when it was stamped; in counts or radians.
+fn counted_rows<'r>(
+    stamps_s: &'r [f64],
+    read_s: &'r [f64],
+    counts: &'r [f64],
+    period_s: f64,
+) -> impl Iterator<Item = (f64, f64)> + 'r {
+    let late_s2 = stamps_s.iter().zip(read_s).map(|(stamp_s, read_s)| (stamp_s - read_s).powi(2)).sum::<f64>();
+    let late = (late_s2 / stamps_s.len() as f64).sqrt() / period_s;
+    let reach = RATE_ROWS.max((4.0 * late) as usize);
+    let mut sizes: Vec<f64> = counts.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
+    let middle = sizes.len() / 2;
+    let most = if sizes.is_empty() { 0.0 } else { MAX_COUNT_RATIO * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 };
+    (reach + 1..stamps_s.len().saturating_sub(reach)).filter_map(move |row| {
+        let (from, to) = (row - 1 - reach, row + reach);
+        let rate = (counts[to] - counts[from]) / (read_s[to] - read_s[from]);
+        let counted = counts[row] - counts[row - 1];
+        let (on_beat, as_stamped) = (read_s[row] - read_s[row - 1], stamps_s[row] - stamps_s[row - 1]);
+        let is_sound = counted.abs() <= most && rate.is_finite();
+        is_sound.then(|| (rate * (on_beat - as_stamped), counted - rate * as_stamped))
+    })
+}
+
 struct State {
     effect: IntervalError,
     stream: Option<Stream>,
@@ -269,5 +333,51 @@ mod tests {
         assert!(off_s(&half, 0.5) < 1e-4, "{}", off_s(&half, 0.5));
         assert!(says.iter().all(|says| *says), "each row has its tick");
         assert!(read_times(&stamped(1.0), -0.9, 0.02).is_none(), "speeds that were logged have true stamps");
+    }
+
+    #[test]
+    fn counts_of_rows_in_bunches_show_when_they_were_read() {
+        // Rows read every 10 ms, received after an exponential delay of 20 ms; none overtakes another.
+        let mut state = 7_u64;
+        let mut uniform = || {
+            state = state * 48_271 % 2_147_483_647;
+            state as f64 / 2_147_483_647.0
+        };
+        let read_s: Vec<f64> = (0..2000).map(|row| 0.01 * f64::from(row)).collect();
+        let mut before_s = f64::NEG_INFINITY;
+        let stamp = |read_s: &f64| {
+            before_s = (read_s - 0.02 * uniform().ln()).max(before_s + 1e-4);
+            before_s
+        };
+        let stamps_s: Vec<f64> = read_s.iter().map(stamp).collect();
+        // A wheel that goes to and fro in 6 s, 2000 counts a second at the most.
+        let counted = |at_s: &[f64]| -> Vec<i64> { at_s.iter().map(|t_s| (2000.0 * t_s.sin()).round() as i64).collect() };
+        let share = |at_s: &[f64]| {
+            let mut run = dataset::Run::default();
+            run.info.continuous = true;
+            run.odometry.t_s.clone_from(&stamps_s);
+            run.odometry.wheels = WheelLog::Ticks(kinematics::Wheels::both(counted(at_s)));
+            share_by_counts(&[Dataset { runs: vec![run], ..empty() }]).expect("rows in bunches")
+        };
+        // The beat is known to a tenth or so of the delays. Rejects a share by times alone, which is the same
+        // for both.
+        assert!((share(&read_s).0 - 1.0).abs() < 0.1, "{:?}", share(&read_s));
+        assert!(share(&stamps_s).0.abs() < 0.1, "{:?}", share(&stamps_s));
+    }
+
+    fn empty() -> Dataset {
+        Dataset {
+            provenance: dataset::Provenance::default(),
+            robot: dataset::NominalRobot {
+                left_wheel_diameter_m: 0.16,
+                right_wheel_diameter_m: 0.16,
+                wheel_separation_m: 0.363,
+                ticks_per_rev: Some(2000.0),
+                counter_bits: None,
+            },
+            truth_noise: dataset::TruthNoise::default(),
+            points: Vec::new(),
+            runs: Vec::new(),
+        }
     }
 }

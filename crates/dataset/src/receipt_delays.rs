@@ -1,0 +1,389 @@
+//! When rows were read that are stamped on receipt: each is held up by a random delay, and none overtakes
+//! another.
+//!
+//! Row n of tick N is read at r = P·N + s and received at t = max(r + d, t₋₁ + w): P the beat, d an exponential
+//! delay of mean m, t₋₁ when the row before was received, and w what a row takes on the line. A row that comes
+//! by itself has the density exp(−(t − r)/m)/m; one that comes on the heels of another was ready before, with
+//! the probability 1 − exp(−(t − r)/m). s stays, but for steps of a whole beat where a row was lost or came
+//! between two ticks and its number does not say so, and a slow walk of the clock. What it was is smoothed
+//! forward and backward over a grid (Baum et al. 1970; Rabiner 1989).
+//!
+//! Where delays are many beats, single steps cannot be told; the mean over all of them is then what a line
+//! through the stamps would be, with as many rows to it as the steps let agree.
+
+/// Cells of the grid in a beat.
+const CELLS: i64 = 8;
+/// Shares of rows that are lost, or, below zero, that came between two ticks: of these the likeliest.
+const LOST: [f64; 17] =
+    [-0.02, -0.01, -5e-3, -2.5e-3, 0.0, 2.5e-3, 5e-3, 1e-2, 1.5e-2, 2e-2, 2.5e-2, 3e-2, 3.5e-2, 4e-2, 5e-2, 6e-2, 8e-2];
+/// Steps in which the share is then sought: at first half of those above, and at the least.
+const LOST_STEPS: [f64; 2] = [1.25e-3, 3e-4];
+/// Log odds against rows that are lost or came between ticks at all.
+const LOST_COST: f64 = 8.0;
+/// Probability of a step of one beat at a row, in either direction, where none is expected.
+const LEAST_STEPS: f64 = 3e-4;
+/// Rows by which the share is found.
+const LOST_ROWS: usize = 3000;
+/// Probability that the clock walks by a cell at a row: a beat in 60,000 rows, root mean square of a walk.
+const WALK: f64 = 1e-3;
+/// Cells whose share of the likeliest one's probability is less are left out.
+const LEAST_SHARE: f64 = 1e-9;
+/// Rows whose predicted probability is less begin anew, as after a pause that is no whole number of beats.
+const LEAST_PROBABILITY: f64 = 1e-12;
+/// Beats by which a row is received before it was read at the most, in the mean: the beat is not known exactly.
+const EARLY: f64 = 0.05;
+/// Mean delays over which a row is sought at first, beside the ones that hold each other up.
+const FIRST_DELAYS: f64 = 12.0;
+/// Mean delays are told apart to a twentieth, and sought from one beat on in steps of twice as much at first.
+const MEANS_PER_E: f64 = 20.0;
+const FIRST_STEP: f64 = 16.0;
+/// Rows of which the probabilities are kept at once.
+const BLOCK_ROWS: usize = 1024;
+/// A row that comes in less of a beat behind another was held up by it.
+const HELD_UP_GAP: f64 = 0.2;
+/// Rows come in bunches where more than this share of them was held up.
+const MIN_HELD_UP_SHARE: f64 = 0.1;
+/// Beats without a row from which on a log pauses: the slope of its beat is that between pauses.
+const PAUSE: f64 = 100.0;
+
+/// Stamps against their beat.
+struct Rows {
+    /// Beats from the tick of a row's number to its stamp.
+    late: Vec<f64>,
+    /// Whether a row came on the heels of the one before.
+    held_up: Vec<bool>,
+}
+
+/// Probabilities of s in beats: of the cells from `first` on.
+#[derive(Clone)]
+struct Beam {
+    first: i64,
+    shares: Vec<f64>,
+}
+
+/// Delays of a mean, and probabilities of steps.
+#[derive(Clone, Copy)]
+struct Delays {
+    mean: f64,
+    /// By a beat later, where a row was lost.
+    later: f64,
+    /// By a beat earlier, where one came between two ticks.
+    earlier: f64,
+}
+
+impl Delays {
+    fn of(mean: f64, lost: f64) -> Self {
+        Self { mean, later: lost.max(LEAST_STEPS), earlier: (-lost).max(LEAST_STEPS) }
+    }
+
+    /// Multiplies the shares by the probability of what came of a row, over that of a row of no delay.
+    fn weigh(&self, rows: &Rows, row: usize, beam: &mut Beam) {
+        let cell = 1.0 / CELLS as f64;
+        // exp(−delay/mean) grows from cell to cell by the same factor.
+        let mut delay = rows.late[row] - cell * beam.first as f64;
+        let (mut free, growth) = ((-delay / self.mean).exp(), (cell / self.mean).exp());
+        let (ready, of_early) = ((-EARLY / self.mean).exp(), -(-EARLY / self.mean).exp_m1());
+        for share in &mut beam.shares {
+            *share *= match (delay < 0.0, rows.held_up[row]) {
+                (false, true) => 1.0 - ready * free,
+                (false, false) => free / self.mean,
+                (true, true) => of_early * (delay / EARLY).exp(),
+                (true, false) => (delay / EARLY).exp() / self.mean,
+            };
+            delay -= cell;
+            free *= growth;
+        }
+    }
+
+    /// What becomes of the shares from row to row.
+    fn step(&self, beam: &Beam) -> Beam {
+        beam.spread(self.earlier, self.later)
+    }
+
+    /// The same from a row to the one before.
+    fn step_back(&self, beam: &Beam) -> Beam {
+        beam.spread(self.later, self.earlier)
+    }
+
+    /// The cells that a row alone leaves open, all alike.
+    fn first(&self, rows: &Rows, row: usize) -> Beam {
+        let cells = |beats: f64| (beats * CELLS as f64) as i64;
+        let last = cells(rows.late[row]) + CELLS;
+        let first = last - cells(FIRST_DELAYS * (1.0 + self.mean)) - 2 * CELLS;
+        let mut beam = Beam { first, shares: vec![1.0; (last - first + 1) as usize] };
+        self.weigh(rows, row, &mut beam);
+        beam
+    }
+
+    /// The beam after a row, with the log of its probability; whether it begins anew there.
+    fn forward(&self, rows: &Rows, row: usize, before: Option<&Beam>) -> (Beam, f64, bool) {
+        if let Some(before) = before {
+            let mut beam = self.step(before);
+            self.weigh(rows, row, &mut beam);
+            let sum: f64 = beam.shares.iter().sum();
+            if sum > LEAST_PROBABILITY {
+                return (beam.trimmed(), sum.ln(), false);
+            }
+        }
+        let beam = self.first(rows, row);
+        let open = beam.shares.len() as f64;
+        (beam.trimmed(), LEAST_PROBABILITY.ln() - open.ln(), true)
+    }
+
+    /// Log likelihood of all rows, and the beams before each block of them.
+    fn blocks(&self, rows: &Rows) -> (f64, Vec<Option<Beam>>) {
+        let (mut log_likelihood, mut blocks, mut beam) = (0.0, Vec::new(), None);
+        for row in 0..rows.late.len() {
+            if row % BLOCK_ROWS == 0 {
+                blocks.push(beam.clone());
+            }
+            let (after, log_probability, _) = self.forward(rows, row, beam.as_ref());
+            log_likelihood += log_probability;
+            beam = Some(after);
+        }
+        (log_likelihood, blocks)
+    }
+
+    /// Expected s of each row, beats, by all of them.
+    fn smoothed(&self, rows: &Rows) -> Vec<f64> {
+        let (_, blocks) = self.blocks(rows);
+        let mut expected = vec![0.0; rows.late.len()];
+        // What the rows behind say of a row's s; nothing behind the last, and before those that begin anew.
+        let mut behind: Option<Beam> = None;
+        for (block, before) in blocks.iter().enumerate().rev() {
+            let from = block * BLOCK_ROWS;
+            let to = rows.late.len().min(from + BLOCK_ROWS);
+            let mut beams: Vec<(Beam, bool)> = Vec::with_capacity(to - from);
+            for row in from..to {
+                let last = beams.last().map(|(beam, _)| beam).or(before.as_ref());
+                let (beam, _, begins) = self.forward(rows, row, last);
+                beams.push((beam, begins));
+            }
+            for (row, (beam, begins)) in (from..to).zip(&beams).rev() {
+                let all = beam.times(behind.as_ref());
+                let cell = |k: usize| (all.first + k as i64) as f64 / CELLS as f64;
+                expected[row] = all.shares.iter().enumerate().map(|(k, share)| share * cell(k)).sum();
+                behind = (!begins).then(|| {
+                    // All cells of the beam say what comes of them; others are not asked.
+                    let mut own = behind.as_ref().map_or_else(|| beam.even(), |behind| behind.over(beam));
+                    self.weigh(rows, row, &mut own);
+                    self.step_back(&own).scaled()
+                });
+            }
+        }
+        expected
+    }
+}
+
+impl Beam {
+    /// Shares that go a beat down and a beat up, walk by a cell, or stay.
+    fn spread(&self, down: f64, up: f64) -> Self {
+        let reach = CELLS as usize;
+        let mut shares = vec![0.0; self.shares.len() + 2 * reach];
+        let walk = 0.5 * WALK;
+        let stay = 1.0 - down - up - WALK;
+        for (k, share) in self.shares.iter().enumerate() {
+            shares[k] += down * share;
+            shares[k + reach - 1] += walk * share;
+            shares[k + reach] += stay * share;
+            shares[k + reach + 1] += walk * share;
+            shares[k + 2 * reach] += up * share;
+        }
+        Self { first: self.first - CELLS, shares }
+    }
+
+    fn scaled(mut self) -> Self {
+        let sum: f64 = self.shares.iter().sum();
+        self.shares.iter_mut().for_each(|share| *share /= sum);
+        self
+    }
+
+    /// Without the cells at its ends that are improbable, scaled.
+    fn trimmed(mut self) -> Self {
+        let least = LEAST_SHARE * self.shares.iter().copied().fold(0.0, f64::max);
+        let counts = |share: &f64| *share > least;
+        let last = self.shares.iter().rposition(counts).unwrap_or(0);
+        let first = self.shares.iter().position(counts).unwrap_or(0);
+        self.shares.truncate(last + 1);
+        self.shares.drain(..first);
+        self.first += first as i64;
+        self.scaled()
+    }
+
+    fn even(&self) -> Self {
+        Self { first: self.first, shares: vec![1.0; self.shares.len()] }
+    }
+
+    /// Its shares on the cells of another.
+    fn over(&self, other: &Self) -> Self {
+        let own = |k: usize| usize::try_from(other.first + k as i64 - self.first).ok();
+        let share = |k: usize| own(k).and_then(|k| self.shares.get(k)).copied().unwrap_or(0.0);
+        Self { first: other.first, shares: (0..other.shares.len()).map(share).collect() }
+    }
+
+    /// The product with what the rows behind say.
+    fn times(&self, behind: Option<&Self>) -> Self {
+        let Some(behind) = behind else { return self.clone() };
+        let mut both = behind.over(self);
+        both.shares.iter_mut().zip(&self.shares).for_each(|(share, own)| *share *= own);
+        // They agree on no cell but by rounding.
+        if both.shares.iter().sum::<f64>() > 0.0 { both.scaled() } else { self.clone() }
+    }
+}
+
+/// Stamps whose delays are beats long: their beat, and when each row was read.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Received {
+    pub(crate) period_s: f64,
+    pub(crate) read_s: Vec<f64>,
+}
+
+impl Received {
+    /// By stamps that do not fall; `None` where rows do not hold up each other.
+    pub(crate) fn of(t_s: &[f64]) -> Option<Self> {
+        let gap_s = slope_s(t_s)?;
+        let is_held_up = |pair: &[f64]| pair[1] - pair[0] < HELD_UP_GAP * gap_s;
+        let count = t_s.windows(2).filter(|pair| is_held_up(pair)).count();
+        if count as f64 <= MIN_HELD_UP_SHARE * (t_s.len() - 1) as f64 {
+            return None;
+        }
+        let held_up: Vec<bool> = std::iter::once(false).chain(t_s.windows(2).map(is_held_up)).collect();
+        let rows = |lost: f64, most: usize| {
+            let period_s = gap_s / (1.0 + lost);
+            let late = (0..most).map(|row| (t_s[row] - t_s[0]) / period_s - row as f64).collect();
+            Rows { late, held_up: held_up[..most].to_vec() }
+        };
+        let mean_of = |steps: f64| (steps / MEANS_PER_E).exp();
+        let likeliest_mean = |first: f64, lost: f64, rows: &Rows| {
+            let log_likelihood = |steps: f64| Delays::of(mean_of(steps), lost).blocks(rows).0;
+            mean_of(likeliest(MEANS_PER_E * first.ln(), [FIRST_STEP, 1.0], log_likelihood))
+        };
+        let most = LOST_ROWS.min(t_s.len());
+        let mean = likeliest_mean(1.0, 0.0, &rows(0.0, most));
+        let log_odds = |lost: f64| {
+            let cost = if lost == 0.0 { 0.0 } else { LOST_COST };
+            Delays::of(mean, lost).blocks(&rows(lost, most)).0 - cost
+        };
+        let odds = LOST.map(|lost| (lost, log_odds(lost)));
+        let lost = odds.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0.0, |(lost, _)| lost);
+        let lost = likeliest(lost, LOST_STEPS, log_odds);
+        let (all, period_s) = (rows(lost, t_s.len()), gap_s / (1.0 + lost));
+        let mean = likeliest_mean(mean, lost, &rows(lost, most));
+        let of_rows = Delays::of(mean, lost).smoothed(&all);
+        let read = |(row, s): (usize, f64)| t_s[0] + period_s * (row as f64 + s);
+        Some(Self { period_s, read_s: of_rows.into_iter().enumerate().map(read).collect() })
+    }
+
+    /// For each row, the tick that it was read at, or next to; 0 for the first.
+    pub(crate) fn numbers(&self) -> Vec<i64> {
+        let mut last = 0;
+        let number = |read_s: &f64| {
+            last = last.max(((read_s - self.read_s[0]) / self.period_s).round() as i64);
+            last
+        };
+        self.read_s.iter().map(number).collect()
+    }
+}
+
+/// The likeliest value from a first one on, by steps that halve (Hooke & Jeeves 1961).
+fn likeliest(first: f64, [mut step, least_step]: [f64; 2], log_likelihood: impl Fn(f64) -> f64) -> f64 {
+    let (mut best, mut most) = (first, log_likelihood(first));
+    while step >= least_step {
+        let tried = [best - step, best + step].map(|value| (value, log_likelihood(value)));
+        match tried.into_iter().find(|(_, found)| *found > most) {
+            Some(found) => (best, most) = found,
+            None => step *= 0.5,
+        }
+    }
+    best
+}
+
+/// Time from row to row by the lines through the rows between pauses; `None` where there is none.
+fn slope_s(t_s: &[f64]) -> Option<f64> {
+    let gap_s = (t_s.last()? - t_s.first()?) / (t_s.len() - 1) as f64;
+    let (mut xy, mut xx) = (0.0, 0.0);
+    for part in t_s.chunk_by(|row, next| next - row < PAUSE * gap_s) {
+        let middle = 0.5 * (part.len() - 1) as f64;
+        for (row, t_s) in part.iter().enumerate() {
+            let x = row as f64 - middle;
+            xx += x * x;
+            xy += x * (t_s - part[0]);
+        }
+    }
+    Some(xy / xx).filter(|slope_s| *slope_s > 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::draws::Draws;
+
+    const PERIOD_S: f64 = 0.01;
+
+    /// When rows are read, of which some are lost, and when they are received that are held up by an
+    /// exponential delay of so many beats; none overtakes another.
+    fn received(rows: i64, lost: f64, delay: f64, mut due_s: impl FnMut(i64) -> f64) -> Vec<[f64; 2]> {
+        let mut draws = Draws(7);
+        let (mut before_s, mut all) = (f64::NEG_INFINITY, Vec::new());
+        for row in 0..rows {
+            let read_s = due_s(row);
+            let stamp_s = (read_s - delay * PERIOD_S * draws.uniform().ln()).max(before_s + 1e-4);
+            if row == 0 || draws.uniform() >= lost {
+                all.push([read_s, stamp_s]);
+                before_s = stamp_s;
+            }
+        }
+        all
+    }
+
+    fn beat(row: i64) -> f64 {
+        PERIOD_S * row as f64
+    }
+
+    fn found(rows: &[[f64; 2]]) -> Received {
+        Received::of(&rows.iter().map(|[_, stamp_s]| *stamp_s).collect::<Vec<_>>()).expect("rows in bunches")
+    }
+
+    /// Mean and standard deviation of what is found wrong, in beats.
+    fn errors(rows: &[[f64; 2]]) -> (f64, f64) {
+        let found = found(rows);
+        let wrong: Vec<f64> =
+            rows.iter().zip(&found.read_s).map(|([read_s, _], found_s)| (found_s - read_s) / PERIOD_S).collect();
+        let mean = wrong.iter().sum::<f64>() / wrong.len() as f64;
+        (mean, (wrong.iter().map(|of| (of - mean).powi(2)).sum::<f64>() / wrong.len() as f64).sqrt())
+    }
+
+    #[test]
+    fn delays_of_many_beats_leave_less_than_one() {
+        let (mean, sigma) = errors(&received(6000, 0.0, 10.0, beat));
+        // Rejects lines through 500 rows, which leave 3 beats and a mean of 29: that of the delays.
+        assert!(mean.abs() < 1.0 && sigma < 0.7, "{mean} ± {sigma}");
+    }
+
+    #[test]
+    fn rows_that_are_lost_shift_those_behind_them() {
+        let rows = received(4000, 0.02, 0.75, beat);
+        let (mean, sigma) = errors(&rows);
+        // Rejects one beat for all rows, 2 % too long, which leaves half a beat.
+        assert!(mean.abs() < 0.1 && sigma < 0.25, "{mean} ± {sigma}");
+        let found = found(&rows);
+        assert!((found.period_s / PERIOD_S - 1.0).abs() < 1e-3, "{}", found.period_s);
+        // The share of lost rows is found in steps of 3e-4: a beat of 4000.
+        assert!(found.numbers().last().is_some_and(|last| (last - 3999).abs() <= 1));
+    }
+
+    #[test]
+    fn a_beat_that_begins_anew_after_a_pause_is_the_same() {
+        let rows = received(3000, 0.0, 1.0, |row| beat(row) + if row >= 1200 { 10.0037 } else { 0.0 });
+        let (mean, sigma) = errors(&rows);
+        // Rejects a pause of a whole number of beats, which is 0.37 of one off on one of its sides.
+        assert!(mean.abs() < 0.1 && sigma < 0.12, "{mean} ± {sigma}");
+    }
+
+    #[test]
+    fn rows_that_hold_up_none_are_not_received_so() {
+        let mut draws = Draws(7);
+        let t_s: Vec<f64> = (0..2000).map(|row| beat(row) + 0.1 * PERIOD_S * draws.normal()).collect();
+        assert_eq!(Received::of(&t_s), None);
+    }
+}
