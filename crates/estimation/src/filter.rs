@@ -65,9 +65,9 @@ pub(super) struct Filter<'f, 'a> {
     pub(super) outliers: Vec<usize>,
     pub(super) noise_score: NoiseScore,
     pub(super) timing: TimingScore,
-    /// Derivatives of a component of the measurement by each column: directly, and in all.
+    /// Derivatives of a component of the measurement by each column directly, and in all of each component.
     direct: Vec<f64>,
-    j: Vec<f64>,
+    j: [Vec<f64>; 3],
 }
 
 /// Filters a segment's measurements at the ends of some propagation intervals, from a free start heading.
@@ -163,7 +163,7 @@ impl<'f, 'a> Filter<'f, 'a> {
             noise_score: NoiseScore::zero(),
             timing: TimingScore::default(),
             direct: vec![0.0; all],
-            j: vec![0.0; all],
+            j: [(); 3].map(|()| vec![0.0; all]),
         }
     }
 
@@ -220,7 +220,7 @@ impl<'f, 'a> Filter<'f, 'a> {
         if free {
             // The instrument's heading is the parameter, the drive's centre follows it round the instrument.
             self.sums.free = true;
-            let last = self.j.len() - 1;
+            let last = self.direct.len() - 1;
             self.by.set(last, self.lever(&measured));
         }
     }
@@ -438,10 +438,9 @@ impl<'f, 'a> Filter<'f, 'a> {
             {
                 *direct = measurement;
             }
-            for ((j, by), direct) in self.j.iter_mut().zip(self.by.along(row)).zip(&self.direct) {
+            for ((j, by), direct) in self.j[component].iter_mut().zip(self.by.along(row)).zip(&self.direct) {
                 *j = -by - direct;
             }
-            self.sums.add(&self.j, v, s);
             if self.pass_options.innovations {
                 let sigma = s.sqrt();
                 self.innovations.push(InnovationComponent {
@@ -452,7 +451,13 @@ impl<'f, 'a> Filter<'f, 'a> {
                     sigma,
                 });
             }
-            self.by.add(gain, &self.j);
+            self.by.add(gain, &self.j[component]);
+        }
+        let ([along, across, heading], [a, b, c]) = (&self.j, &measured);
+        if components == 3 {
+            self.sums.add([along, across, heading], [a.v, b.v, c.v], [a.s, b.s, c.s]);
+        } else {
+            self.sums.add([along, across], [a.v, b.v], [a.s, b.s]);
         }
         self.pose =
             Pose::new(self.pose.x_m + correction.x, self.pose.y_m + correction.y, self.pose.theta_rad + correction.z);

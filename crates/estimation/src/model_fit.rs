@@ -18,8 +18,8 @@ use crate::pass_options::{OutlierGate, PassOptions};
 use crate::records::Records;
 use crate::segment::Segment;
 use crate::settings::{
-    MAX_AUTOCORRELATION_LAG, MAX_OBSERVABLE_SIGMA, MIN_CLUSTERS, MIN_MEASUREMENTS_PER_RUN, MIN_NAMED_DIRECTION,
-    MIN_OWN_DIRECTION, MIN_RUNS_TO_HOLD_OUT, MIN_SPARE_CLUSTERS, ROTATED_SENSOR_RAD, SPACING_SLACK, THINNING_FACTOR,
+    CERTAINLY_CORRELATED_Z, MAX_AUTOCORRELATION_LAG, MAX_OBSERVABLE_SIGMA, MIN_CLUSTERS, MIN_MEASUREMENTS_PER_RUN, MIN_NAMED_DIRECTION,
+    MIN_OWN_DIRECTION, MIN_RUNS_TO_HOLD_OUT, MIN_SPARE_CLUSTERS, PRELIMINARY_THINNING_STEPS, ROTATED_SENSOR_RAD, SPACING_SLACK, THINNING_FACTOR,
     THINNING_PHASES, WHITENESS_Z,
 };
 use crate::thinning::{Selection, Thinning};
@@ -133,7 +133,16 @@ impl ModelFit<'_> {
     ) -> Result<(), EstimationError> {
         let from =
             from.unwrap_or_else(|| InitialValues { model: self.start.clone(), noise: None, free_headings: None });
-        self.solution = fit_from(&self.records, &self.selections, from, &self.prior, terms, &self.fit_options())?;
+        self.refit_with(from, terms, &self.fit_options())
+    }
+
+    fn refit_with(
+        &mut self,
+        from: InitialValues,
+        terms: &mut [Box<dyn ModelTerm>],
+        options: &FitOptions,
+    ) -> Result<(), EstimationError> {
+        self.solution = fit_from(&self.records, &self.selections, from, &self.prior, terms, options)?;
         Ok(())
     }
 
@@ -163,11 +172,21 @@ impl ModelFit<'_> {
     /// Thins measurements until their innovations are white, or a run has too few left.
     pub(crate) fn thin(&mut self) -> Result<(), EstimationError> {
         let Some(between_s) = median_between(&self.records) else { return Ok(()) };
-        let mut every_s = between_s;
+        let (mut every_s, mut is_preliminary) = (between_s, false);
         while !self.is_white() {
             every_s *= THINNING_FACTOR;
             let Some((thinning, selections)) = self.thinned(every_s, between_s) else { break };
             (self.selections, self.thinning) = (Arc::new(selections), thinning);
+            // Where a few steps leave no doubt that measurements are still too near to each other, the fit to
+            // them need not converge: nothing but its end is used.
+            let preliminary = FitOptions { max_steps: PRELIMINARY_THINNING_STEPS, ..self.fit_options() };
+            self.refit_with(self.current_values(), &mut [], &preliminary)?;
+            is_preliminary = self.correlation() > CERTAINLY_CORRELATED_Z;
+            if !is_preliminary {
+                self.refit(Some(self.current_values()), &mut [])?;
+            }
+        }
+        if is_preliminary {
             self.refit(Some(self.current_values()), &mut [])?;
         }
         Ok(())

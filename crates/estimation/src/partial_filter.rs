@@ -373,7 +373,7 @@ impl<'f> PartialFilter<'f> {
             j[Column::GyroScale.index()] -= turn_rad;
         }
         j.resize(columns + 1, 0.0);
-        sums.add(&j, v, s);
+        sums.add([&j], [v], [s]);
         self.score_noise(&row, &gain, v, s);
         self.state += &gain * v;
         self.covariance -= &gain * ph.transpose();

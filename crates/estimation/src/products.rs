@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::model::Column;
 use crate::normal_equations::NormalEquations;
 use crate::settings::MIN_VARIANCE_PRODUCT;
 
@@ -11,6 +12,8 @@ use crate::settings::MIN_VARIANCE_PRODUCT;
 pub(crate) struct Products {
     /// Number of the first columns, which have products with all.
     common: usize,
+    /// Those of the first columns whose products are taken, in order.
+    rows: Vec<usize>,
     /// For each further column, the first of those of its part: it has products with these.
     first: Vec<usize>,
 }
@@ -18,13 +21,17 @@ pub(crate) struct Products {
 impl Products {
     /// Of so many columns, the last of which come in parts: those of a part have products with what comes
     /// before all parts, and with each other.
-    pub(crate) fn of(columns: usize, parts: &[usize]) -> Self {
+    ///
+    /// A fit steps along its `free` columns alone: products of two others stay zero. `None`: all are taken.
+    pub(crate) fn of(columns: usize, parts: &[usize], free: Option<&[Column]>) -> Self {
         let common = columns - parts.iter().sum::<usize>();
+        let is_taken = |row: &usize| free.is_none_or(|free| free.iter().any(|column| column.index() == *row));
+        let rows = (0..common).filter(is_taken).collect();
         let mut first = Vec::new();
         for part in parts {
             first.extend(std::iter::repeat_n(common + first.len(), *part));
         }
-        Self { common, first }
+        Self { common, rows, first }
     }
 }
 
@@ -67,44 +74,68 @@ impl<'p> Sums<'p> {
         }
     }
 
-    /// Adds an innovation v of variance s with derivatives j.
+    /// Adds innovations v of variances s, uncorrelated, with derivatives j: all components of a measurement at
+    /// once, as sums are read and written once for them.
     #[inline(always)]
-    pub(crate) fn add(&mut self, j: &[f64], v: f64, s: f64) {
-        let per_s = 1.0 / s;
-        for (gradient, j) in self.gradient.iter_mut().zip(j) {
-            *gradient += per_s * v * j;
-        }
-        let last = if self.free { Some(&j[self.columns - 1]) } else { None };
-        for (row, a) in self.common.chunks_exact_mut(self.columns).zip(j[..self.products.common].iter().chain(last)) {
-            let scaled = a * per_s;
-            for (out, b) in row.iter_mut().zip(j) {
-                *out += scaled * b;
+    pub(crate) fn add<const N: usize>(&mut self, j: [&[f64]; N], v: [f64; N], s: [f64; N]) {
+        let Self { products, columns, common, own, gradient, .. } = self;
+        let columns = *columns;
+        let j = j.map(|j| &j[..columns]);
+        let per_s = s.map(|s| 1.0 / s);
+        let pull: [f64; N] = std::array::from_fn(|k| per_s[k] * v[k]);
+        let gradient = &mut gradient[..columns];
+        for column in 0..columns {
+            for k in 0..N {
+                gradient[column] += pull[k] * j[k][column];
             }
         }
-        if self.own.len() == self.products.first.len() {
+        let last = self.free.then_some(columns - 1);
+        let heading = last.map(|last| (products.common, last));
+        for (row, column) in products.rows.iter().map(|row| (*row, *row)).chain(heading) {
+            // Products with the columns before it stand in their rows; those of the heading are read as a whole.
+            let from = if row == column { row } else { 0 };
+            let scaled: [f64; N] = std::array::from_fn(|k| j[k][column] * per_s[k]);
+            let out = &mut common[row * columns + from..(row + 1) * columns];
+            let of = j.map(|j| &j[from..][..out.len()]);
+            for at in 0..out.len() {
+                for k in 0..N {
+                    out[at] += scaled[k] * of[k][at];
+                }
+            }
+        }
+        if own.len() == products.first.len() {
             // All parts are of one column, as they mostly are: many at a time.
-            for (out, j) in self.own.iter_mut().zip(&j[self.products.common..]) {
-                *out += j * per_s * j;
+            let own = &mut own[..];
+            let of = j.map(|j| &j[products.common..][..own.len()]);
+            for at in 0..own.len() {
+                for k in 0..N {
+                    own[at] += of[k][at] * per_s[k] * of[k][at];
+                }
             }
         } else {
-            let mut own = &mut self.own[..];
-            for (further, &first) in self.products.first.iter().enumerate() {
-                let column = self.products.common + further;
+            let mut own = &mut own[..];
+            for (further, &first) in products.first.iter().enumerate() {
+                let column = products.common + further;
                 let (out, rest) = own.split_at_mut(column + 1 - first);
-                let scaled = j[column] * per_s;
-                for (out, b) in out.iter_mut().zip(&j[first..]) {
-                    *out += scaled * b;
+                let scaled: [f64; N] = std::array::from_fn(|k| j[k][column] * per_s[k]);
+                let of = j.map(|j| &j[first..][..out.len()]);
+                for at in 0..out.len() {
+                    for k in 0..N {
+                        out[at] += scaled[k] * of[k][at];
+                    }
                 }
                 own = rest;
             }
         }
-        self.chi_square += v * v * per_s;
-        self.det *= s;
-        if !(MIN_VARIANCE_PRODUCT..=MIN_VARIANCE_PRODUCT.recip()).contains(&self.det) {
-            self.log_det += self.det.ln();
-            self.det = 1.0;
+        for k in 0..N {
+            self.chi_square += v[k] * pull[k];
+            self.det *= s[k];
+            if !(MIN_VARIANCE_PRODUCT..=MIN_VARIANCE_PRODUCT.recip()).contains(&self.det) {
+                self.log_det += self.det.ln();
+                self.det = 1.0;
+            }
+            self.count += 1.0;
         }
-        self.count += 1.0;
     }
 
     /// The products of all columns but the heading; those that are not taken are zero.
@@ -114,8 +145,9 @@ impl<'p> Sums<'p> {
             information[(row, column)] = value;
             information[(column, row)] = value;
         };
-        for (row, products) in self.common.chunks_exact(self.columns).take(self.products.common).enumerate() {
-            products[row..columns].iter().enumerate().for_each(|(beyond, value)| set(row, row + beyond, *value));
+        for &row in &self.products.rows {
+            let products = &self.common[row * self.columns..][..columns];
+            products[row..].iter().enumerate().for_each(|(beyond, value)| set(row, row + beyond, *value));
         }
         let mut own = self.own.iter();
         for (further, &first) in self.products.first.iter().enumerate() {

@@ -350,14 +350,23 @@ pub(crate) const RELATIVE_DAMPING: f64 = 1e-7;
 /// Budgeted: a standard deviation of 3e4, far beyond any parameter.
 pub(crate) const ABSOLUTE_DAMPING: f64 = 1e-9;
 
+/// Steps of the fit of thinned measurements after which their innovations are tested for the first time.
+/// Budgeted: such a fit costs a quarter of one that converges, and the test does not depend on the noise's
+/// scale.
+pub(crate) const PRELIMINARY_THINNING_STEPS: usize = 3;
+
+/// Autocorrelation of that fit's innovations, in standard errors, from which on they are not white for sure.
+/// Budgeted: three times [`WHITENESS_Z`]; nearer to it the fit converges first.
+pub(crate) const CERTAINLY_CORRELATED_Z: f64 = 3.0 * WHITENESS_Z;
+
 // Cached propagation.
 
 /// Intervals of a phase in all from which on propagations are cached.
 /// Budgeted: about ten milliseconds of a pass.
 pub(crate) const MIN_CACHED_INTERVALS: usize = 100_000;
 
-/// Intervals of a propagation, on average, from which on propagations are cached.
-/// Budgeted: integrating them then takes longer than all else in a pass.
+/// Intervals of a propagation, on average, from which on propagations without terms are cached.
+/// Budgeted: integrating them then takes longer than all else in a pass. With terms, single intervals do.
 pub(crate) const MIN_INTERVALS_PER_CACHED_PROPAGATION: usize = 3;
 
 /// Squared step of the mean over its variance below which cached propagations serve the next step.
