@@ -8,6 +8,7 @@
 use estimation::{InnovationComponent, ModelFit, Segment, WHITENESS_Z};
 
 use crate::augmented_model::AugmentedModel;
+use crate::candidate::terms;
 use crate::check::{Check, Component, ResidualPersistence, TestResult};
 use crate::covariate_tests::covariates;
 use crate::null_distribution::{NullDistribution, among_simulated, beyond_simulated};
@@ -42,7 +43,7 @@ pub(crate) struct Outliers {
 
 /// Asks the residuals of a model.
 pub(crate) fn check(model: &AugmentedModel<'_>) -> Checked {
-    let fit = &model.fit;
+    let fit = &*model.fit.with_innovations(&mut terms(&model.candidates));
     let null = NullDistribution::of(model);
     let NoiseTests { mut checks, mut correlation, mut outliers } = noise_tests(fit);
     if let Some(null) = &null {

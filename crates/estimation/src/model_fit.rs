@@ -18,9 +18,8 @@ use crate::pass_options::{OutlierGate, PassOptions};
 use crate::records::Records;
 use crate::segment::Segment;
 use crate::settings::{
-    CERTAINLY_CORRELATED_Z, MAX_AUTOCORRELATION_LAG, MAX_OBSERVABLE_SIGMA, MIN_CLUSTERS, MIN_MEASUREMENTS_PER_RUN, MIN_NAMED_DIRECTION,
-    MIN_OWN_DIRECTION, MIN_RUNS_TO_HOLD_OUT, MIN_SPARE_CLUSTERS, PRELIMINARY_THINNING_STEPS, ROTATED_SENSOR_RAD, SPACING_SLACK, THINNING_FACTOR,
-    THINNING_PHASES, WHITENESS_Z,
+    MAX_AUTOCORRELATION_LAG, MAX_FIT_STEPS, MAX_OBSERVABLE_SIGMA, MIN_CLUSTERS, MIN_NAMED_DIRECTION, MIN_OWN_DIRECTION,
+    MIN_RUNS_TO_HOLD_OUT, MIN_SPARE_CLUSTERS, ROTATED_SENSOR_RAD, WHITENESS_Z,
 };
 use crate::thinning::{Selection, Thinning};
 
@@ -131,18 +130,20 @@ impl ModelFit<'_> {
         from: Option<InitialValues>,
         terms: &mut [Box<dyn ModelTerm>],
     ) -> Result<(), EstimationError> {
-        let from =
-            from.unwrap_or_else(|| InitialValues { model: self.start.clone(), noise: None, free_headings: None });
-        self.refit_with(from, terms, &self.fit_options())
+        self.refit_within(MAX_FIT_STEPS, from, terms)
     }
 
-    fn refit_with(
+    /// The same in so many steps at most.
+    pub(crate) fn refit_within(
         &mut self,
-        from: InitialValues,
+        max_steps: usize,
+        from: Option<InitialValues>,
         terms: &mut [Box<dyn ModelTerm>],
-        options: &FitOptions,
     ) -> Result<(), EstimationError> {
-        self.solution = fit_from(&self.records, &self.selections, from, &self.prior, terms, options)?;
+        let from =
+            from.unwrap_or_else(|| InitialValues { model: self.start.clone(), noise: None, free_headings: None });
+        let options = FitOptions { max_steps, ..self.fit_options() };
+        self.solution = fit_from(&self.records, &self.selections, from, &self.prior, terms, &options)?;
         Ok(())
     }
 
@@ -167,42 +168,6 @@ impl ModelFit<'_> {
     pub(crate) fn current_values(&self) -> InitialValues {
         let Solution { model, noise, free_headings, .. } = &self.solution;
         InitialValues { model: model.clone(), noise: Some(*noise), free_headings: Some(free_headings.clone()) }
-    }
-
-    /// Thins measurements until their innovations are white, or a run has too few left.
-    pub(crate) fn thin(&mut self) -> Result<(), EstimationError> {
-        let Some(between_s) = median_between(&self.records) else { return Ok(()) };
-        let (mut every_s, mut is_preliminary) = (between_s, false);
-        while !self.is_white() {
-            every_s *= THINNING_FACTOR;
-            let Some((thinning, selections)) = self.thinned(every_s, between_s) else { break };
-            (self.selections, self.thinning) = (Arc::new(selections), thinning);
-            // Where a few steps leave no doubt that measurements are still too near to each other, the fit to
-            // them need not converge: nothing but its end is used.
-            let preliminary = FitOptions { max_steps: PRELIMINARY_THINNING_STEPS, ..self.fit_options() };
-            self.refit_with(self.current_values(), &mut [], &preliminary)?;
-            is_preliminary = self.correlation() > CERTAINLY_CORRELATED_Z;
-            if !is_preliminary {
-                self.refit(Some(self.current_values()), &mut [])?;
-            }
-        }
-        if is_preliminary {
-            self.refit(Some(self.current_values()), &mut [])?;
-        }
-        Ok(())
-    }
-
-    /// Measurements at a spacing of `every_s`, seconds; `None` when a run has too few left.
-    fn thinned(&self, every_s: f64, between_s: f64) -> Option<(Thinning, Vec<Selection>)> {
-        let thinning = Thinning { every_s: every_s - SPACING_SLACK * between_s, phases: THINNING_PHASES };
-        let selections = Selection::of(&self.records, thinning, &self.nominal);
-        (selections[0].mean_measurements(&self.records) >= MIN_MEASUREMENTS_PER_RUN).then_some((thinning, selections))
-    }
-
-    /// Does [`Self::thin`] leave measurements out?
-    pub(crate) fn is_to_be_thinned(&self) -> bool {
-        let between_s = median_between(&self.records).filter(|_| !self.is_white());
-        between_s.is_some_and(|between_s| self.thinned(THINNING_FACTOR * between_s, between_s).is_some())
     }
 
     pub(crate) fn is_white(&self) -> bool {
@@ -503,14 +468,4 @@ fn geometry_information(matrix: &DMatrix<f64>) -> Matrix3<f64> {
         DMatrix::zeros(3, 3)
     };
     Matrix3::from_iterator((own - rest).iter().copied())
-}
-
-/// Median time between measurements.
-fn median_between(records: &Records<'_>) -> Option<f64> {
-    let mut between: Vec<f64> = records.times_between().collect();
-    if between.is_empty() {
-        return None;
-    }
-    let middle = between.len() / 2;
-    Some(*between.select_nth_unstable_by(middle, f64::total_cmp).1)
 }

@@ -79,37 +79,24 @@ impl<'p> Sums<'p> {
     #[inline(always)]
     pub(crate) fn add<const N: usize>(&mut self, j: [&[f64]; N], v: [f64; N], s: [f64; N]) {
         let Self { products, columns, common, own, gradient, .. } = self;
-        let columns = *columns;
-        let j = j.map(|j| &j[..columns]);
-        let per_s = s.map(|s| 1.0 / s);
-        let pull: [f64; N] = std::array::from_fn(|k| per_s[k] * v[k]);
-        let gradient = &mut gradient[..columns];
-        for column in 0..columns {
-            for k in 0..N {
-                gradient[column] += pull[k] * j[k][column];
-            }
+        let (mut per_s, mut pull) = ([0.0; N], [0.0; N]);
+        for k in 0..N {
+            per_s[k] = 1.0 / s[k];
+            pull[k] = per_s[k] * v[k];
         }
-        let last = self.free.then_some(columns - 1);
-        let heading = last.map(|last| (products.common, last));
+        add_multiples(gradient, j, pull);
+        let heading = self.free.then_some((products.common, *columns - 1));
         for (row, column) in products.rows.iter().map(|row| (*row, *row)).chain(heading) {
             // Products with the columns before it stand in their rows; those of the heading are read as a whole.
             let from = if row == column { row } else { 0 };
-            let scaled: [f64; N] = std::array::from_fn(|k| j[k][column] * per_s[k]);
-            let out = &mut common[row * columns + from..(row + 1) * columns];
-            let of = j.map(|j| &j[from..][..out.len()]);
-            for at in 0..out.len() {
-                for k in 0..N {
-                    out[at] += scaled[k] * of[k][at];
-                }
-            }
+            let scaled = scaled_column(j, column, per_s);
+            add_multiples(&mut common[row * *columns + from..(row + 1) * *columns], beyond(j, from), scaled);
         }
         if own.len() == products.first.len() {
             // All parts are of one column, as they mostly are: many at a time.
-            let own = &mut own[..];
-            let of = j.map(|j| &j[products.common..][..own.len()]);
-            for at in 0..own.len() {
-                for k in 0..N {
-                    own[at] += of[k][at] * per_s[k] * of[k][at];
+            for (own_j, per_s) in beyond(j, products.common).into_iter().zip(per_s) {
+                for (out, j) in own.iter_mut().zip(own_j) {
+                    *out += j * per_s * j;
                 }
             }
         } else {
@@ -117,13 +104,7 @@ impl<'p> Sums<'p> {
             for (further, &first) in products.first.iter().enumerate() {
                 let column = products.common + further;
                 let (out, rest) = own.split_at_mut(column + 1 - first);
-                let scaled: [f64; N] = std::array::from_fn(|k| j[k][column] * per_s[k]);
-                let of = j.map(|j| &j[first..][..out.len()]);
-                for at in 0..out.len() {
-                    for k in 0..N {
-                        out[at] += scaled[k] * of[k][at];
-                    }
-                }
+                add_multiples(out, beyond(j, first), scaled_column(j, column, per_s));
                 own = rest;
             }
         }
@@ -184,5 +165,38 @@ impl<'p> Sums<'p> {
         equations.log_det += own.ln();
         equations.count -= 1.0;
         (equations, Some((-gradient / own, by)))
+    }
+}
+
+// Loops, and no closures over arrays: these would be called, and compiled without the kernel's instructions.
+
+/// The rows from a column on.
+#[inline(always)]
+fn beyond<const N: usize>(mut rows: [&[f64]; N], from: usize) -> [&[f64]; N] {
+    for row in &mut rows {
+        *row = &row[from..];
+    }
+    rows
+}
+
+/// The rows' values in a column, each times its factor.
+#[inline(always)]
+fn scaled_column<const N: usize>(rows: [&[f64]; N], column: usize, mut by: [f64; N]) -> [f64; N] {
+    for (by, row) in by.iter_mut().zip(rows) {
+        *by *= row[column];
+    }
+    by
+}
+
+/// Adds to `out` as many values of each row as it has, times the row's factor.
+#[inline(always)]
+fn add_multiples<const N: usize>(out: &mut [f64], mut rows: [&[f64]; N], by: [f64; N]) {
+    for row in &mut rows {
+        *row = &row[..out.len()];
+    }
+    for (at, out) in out.iter_mut().enumerate() {
+        for k in 0..N {
+            *out += by[k] * rows[k][at];
+        }
     }
 }

@@ -5,11 +5,16 @@
 //! what it says. `Convention:` is customary. `Published:` names author, year and equation.
 
 mod partial;
+mod thinning;
 
 pub(crate) use partial::{
     BIAS_WALK_RADPS, GYRO_BIAS_SIGMA_RADPS, GYRO_WINDOW_S, MIN_DISTANCE_M, MIN_GYRO_NOISE_RAD_PER_SQRT_S,
     MIN_STANDING_PAIRS, START_HEADING_SIGMA_RAD, START_POSITION_SIGMA_M, WALL_DIRECTION_SIGMA_RAD, WALL_OFFSET_SIGMA_M,
     WALL_START_DIRECTIONS, WALL_START_STEPS,
+};
+pub(crate) use thinning::{
+    CERTAINLY_CORRELATED_Z, MIN_MEASUREMENTS_PER_RUN, PRELIMINARY_THINNING_STEPS, SPACING_SLACK, THINNING_FACTOR,
+    THINNING_PHASES,
 };
 
 // Numbers of arithmetic.
@@ -205,7 +210,7 @@ pub(crate) const RESTART_AFTER_OUTLIERS: u32 = 2;
 /// Tuned: by hand; no record of what on.
 pub(crate) const MIN_OUTLIER_REDUCTION: usize = 2;
 
-// Whiteness and thinning.
+// Whiteness; thinning has a file of its own.
 
 /// Autocorrelation of the innovations, standard errors, below which they count as white.
 /// Derived: two-sided level of 1 % over three components together, Φ⁻¹(1 − 0.01/6).
@@ -218,22 +223,6 @@ pub(crate) const MAX_AUTOCORRELATION_LAG: i32 = 5;
 /// Weight of a pair of displacements for each further measurement between them.
 /// Derived: autocorrelation that is worth finding lasts for about three displacements, e^(−1/3).
 pub(crate) const AUTOCORRELATION_DECAY: f64 = 0.7;
-
-/// Phases in which thinned measurements are taken.
-/// Tuned: by hand; no record of what on.
-pub(crate) const THINNING_PHASES: usize = 4;
-
-/// Factor from one thinning to the next.
-/// Convention: doubling.
-pub(crate) const THINNING_FACTOR: f64 = 2.0;
-
-/// Share of a measurement's interval by which the spacing may be short: instruments jitter.
-/// Derived: half of an interval, so that jitter does not pass over the measurement that is due.
-pub(crate) const SPACING_SLACK: f64 = 0.5;
-
-/// Fewest measurements of a run, on average, that thinning leaves.
-/// Derived: with fewer a run would be no more than its ends.
-pub(crate) const MIN_MEASUREMENTS_PER_RUN: f64 = 1.0;
 
 // Observability and covariance.
 
@@ -349,15 +338,6 @@ pub(crate) const RELATIVE_DAMPING: f64 = 1e-7;
 /// Damping of a Gauss–Newton step where nothing is known of a direction.
 /// Budgeted: a standard deviation of 3e4, far beyond any parameter.
 pub(crate) const ABSOLUTE_DAMPING: f64 = 1e-9;
-
-/// Steps of the fit of thinned measurements after which their innovations are tested for the first time.
-/// Budgeted: such a fit costs a quarter of one that converges, and the test does not depend on the noise's
-/// scale.
-pub(crate) const PRELIMINARY_THINNING_STEPS: usize = 3;
-
-/// Autocorrelation of that fit's innovations, in standard errors, from which on they are not white for sure.
-/// Budgeted: three times [`WHITENESS_Z`]; nearer to it the fit converges first.
-pub(crate) const CERTAINLY_CORRELATED_Z: f64 = 3.0 * WHITENESS_Z;
 
 // Cached propagation.
 
