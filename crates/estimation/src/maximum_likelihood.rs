@@ -49,11 +49,7 @@ impl FitSettings {
         let nominal = Model::of(&first.robot.geometry()?, 0);
         let mut found = ModelFit::before_any_step(sessions, nominal, ends, self.thin_displacements);
         found.free_extrinsics_if_rotated();
-        if self.thin && !self.nuisances {
-            found.refit_or_certainly_correlated(None)?;
-        } else {
-            found.refit(None, &mut [])?;
-        }
+        found.refit(None, &mut [])?;
         found.fix_unobservable()?;
         let explained = if self.nuisances { explained_by_nuisances(&found, self.thin)? } else { Explained::NotTried };
         let is_explained = matches!(explained, Explained::Yes(_));

@@ -18,7 +18,7 @@ use crate::pass_options::{OutlierGate, PassOptions};
 use crate::records::Records;
 use crate::segment::Segment;
 use crate::settings::{
-    MAX_AUTOCORRELATION_LAG, MAX_FIT_STEPS, MAX_OBSERVABLE_SIGMA, MIN_CLUSTERS, MIN_NAMED_DIRECTION, MIN_OWN_DIRECTION,
+    MAX_AUTOCORRELATION_LAG, MAX_OBSERVABLE_SIGMA, MIN_CLUSTERS, MIN_NAMED_DIRECTION, MIN_OWN_DIRECTION,
     MIN_RUNS_TO_HOLD_OUT, MIN_SPARE_CLUSTERS, ROTATED_SENSOR_RAD, WHITENESS_Z,
 };
 use crate::thinning::{Selection, Thinning};
@@ -130,20 +130,9 @@ impl ModelFit<'_> {
         from: Option<InitialValues>,
         terms: &mut [Box<dyn ModelTerm>],
     ) -> Result<(), EstimationError> {
-        self.refit_within(MAX_FIT_STEPS, from, terms)
-    }
-
-    /// The same in so many steps at most.
-    pub(crate) fn refit_within(
-        &mut self,
-        max_steps: usize,
-        from: Option<InitialValues>,
-        terms: &mut [Box<dyn ModelTerm>],
-    ) -> Result<(), EstimationError> {
         let from =
             from.unwrap_or_else(|| InitialValues { model: self.start.clone(), noise: None, free_headings: None });
-        let options = FitOptions { max_steps, ..self.fit_options() };
-        self.solution = fit_from(&self.records, &self.selections, from, &self.prior, terms, &options)?;
+        self.solution = fit_from(&self.records, &self.selections, from, &self.prior, terms, &self.fit_options())?;
         Ok(())
     }
 

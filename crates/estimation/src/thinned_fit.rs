@@ -1,5 +1,5 @@
-//! Fits of thinned measurements: the spacing at which innovations are white, and fits that end early where
-//! there is no doubt that they are not.
+//! Fits of thinned measurements: the spacing at which innovations are white; and fits that leave their
+//! innovations out.
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -8,41 +8,22 @@ use model_term::ModelTerm;
 
 use crate::error::EstimationError;
 use crate::model_fit::ModelFit;
-use crate::optimizer::InitialValues;
 use crate::records::Records;
-use crate::settings::{
-    CERTAINLY_CORRELATED_Z, MIN_MEASUREMENTS_PER_RUN, PRELIMINARY_THINNING_STEPS, SPACING_SLACK, THINNING_FACTOR,
-    THINNING_PHASES,
-};
+use crate::settings::{MIN_MEASUREMENTS_PER_RUN, SPACING_SLACK, THINNING_FACTOR, THINNING_PHASES};
 use crate::thinning::{Selection, Thinning};
 
 impl ModelFit<'_> {
     /// Thins measurements until their innovations are white, or a run has too few left.
     pub(crate) fn thin(&mut self) -> Result<(), EstimationError> {
-        let Some(between_s) = median_between(&self.records) else { return self.converge() };
+        let Some(between_s) = median_between(&self.records) else { return Ok(()) };
         let mut every_s = between_s;
         while !self.is_white() {
             every_s *= THINNING_FACTOR;
             let Some((thinning, selections)) = self.thinned(every_s, between_s) else { break };
             (self.selections, self.thinning) = (Arc::new(selections), thinning);
-            self.refit_or_certainly_correlated(Some(self.current_values()))?;
+            self.refit(Some(self.current_values()), &mut [])?;
         }
-        self.converge()
-    }
-
-    /// A fit that is to be thinned. Where a few steps leave no doubt that measurements are too near to each
-    /// other, it need not converge: only how they are thinned follows from it.
-    pub(crate) fn refit_or_certainly_correlated(&mut self, from: Option<InitialValues>) -> Result<(), EstimationError> {
-        self.refit_within(PRELIMINARY_THINNING_STEPS, from, &mut [])?;
-        if self.correlation() > CERTAINLY_CORRELATED_Z {
-            return Ok(());
-        }
-        self.refit(Some(self.current_values()), &mut [])
-    }
-
-    /// Goes on to the end of a fit that ended early.
-    fn converge(&mut self) -> Result<(), EstimationError> {
-        if self.solution.converged { Ok(()) } else { self.refit(Some(self.current_values()), &mut []) }
+        Ok(())
     }
 
     /// Measurements at a spacing of `every_s`, seconds; `None` when a run has too few left.
