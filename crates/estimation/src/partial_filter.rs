@@ -403,7 +403,7 @@ impl<'f> PartialFilter<'f> {
             let sigma = lower[(component, component)];
             let mut j: Vec<f64> = whitened_by.row(component).iter().map(|by| by * sigma).collect();
             j.resize(columns + 1, 0.0);
-            sums.add(&j, whitened[component] * sigma, sigma * sigma);
+            sums.add([&j], [whitened[component] * sigma], [sigma * sigma]);
         }
         let inverse = root.inverse();
         let gain = &ph * inverse;
