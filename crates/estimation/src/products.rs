@@ -85,10 +85,9 @@ impl<'p> Sums<'p> {
             pull[k] = per_s[k] * v[k];
         }
         add_multiples(gradient, j, pull);
-        let heading = self.free.then_some((products.common, *columns - 1));
-        for (row, column) in products.rows.iter().map(|row| (*row, *row)).chain(heading) {
-            // Products with the columns before it stand in their rows; those of the heading are read as a whole.
-            let from = if row == column { row } else { 0 };
+        // Products with the columns before it stand in their rows; those of the heading are read as a whole.
+        let heading = self.free.then_some((products.common, *columns - 1, 0));
+        for (row, column, from) in products.rows.iter().map(|row| (*row, *row, *row)).chain(heading) {
             let scaled = scaled_column(j, column, per_s);
             add_multiples(&mut common[row * *columns + from..(row + 1) * *columns], beyond(j, from), scaled);
         }
