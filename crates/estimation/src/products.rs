@@ -74,8 +74,8 @@ impl<'p> Sums<'p> {
         }
     }
 
-    /// Adds innovations v of variances s, uncorrelated, with derivatives j: all components of a measurement at
-    /// once, as sums are read and written once for them.
+    /// Adds innovations v of variances s, uncorrelated, with derivatives j: all components of a measurement
+    /// at once, as sums are read and written once for them.
     #[inline(always)]
     pub(crate) fn add<const N: usize>(&mut self, j: [&[f64]; N], v: [f64; N], s: [f64; N]) {
         let Self { products, columns, common, own, gradient, .. } = self;

@@ -106,8 +106,8 @@ impl Selection {
     }
 
     /// Whether integrating the propagations, with terms or without, takes so long that caching them is worth
-    /// it. With that many intervals a standard deviation is so small a step that cached propagations follow it
-    /// to first order.
+    /// it. With that many intervals a standard deviation is so small a step that cached propagations follow
+    /// it to first order.
     pub(crate) fn has_long_propagations(all: &[Self], with_terms: bool) -> bool {
         let propagations = || all.iter().flat_map(|selection| &selection.propagations).flatten();
         let intervals: usize = propagations().map(|propagation| propagation.intervals.len()).sum();
