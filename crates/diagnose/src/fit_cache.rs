@@ -47,7 +47,8 @@ impl<'a> FitCache<'a> {
 
     pub(crate) fn keep(&mut self, model: &AugmentedModel<'a>) {
         if self.fit(&model.candidates).is_none() {
-            self.fits.push(Arc::new(model.clone()));
+            let AugmentedModel { fit, candidates } = model.clone();
+            self.fits.push(Arc::new(AugmentedModel { fit: fit.without_innovations(), candidates }));
         }
     }
 }

@@ -113,6 +113,7 @@ fn search_beside_timing_noise<'a>(base: ModelFit<'a>, catalogue: &[Candidate]) -
     match noisy_base(&base, &found.model) {
         None => (base, MeanModel::of_effects(found)),
         Some(noisy) => {
+            drop((base, found)); // their fits are large
             let found = search(&noisy, catalogue, SCAN_LEVEL, FitCache::default());
             (noisy, MeanModel::of_effects(found))
         }
@@ -188,6 +189,7 @@ fn thin_if_autocorrelated<'a>(
         return Decorrelated { base, model, correlated: None, spurious };
     };
     let correlated = Some(model.checked.correlation);
+    drop((base, model)); // their fits are large
     let (base, model) = search_beside_timing_noise(thinned, catalogue);
     Decorrelated { base, model, correlated, spurious }
 }

@@ -75,7 +75,7 @@ pub(crate) fn scatter(structure: &MeanStructure<'_>, without_ids: &[String]) -> 
         let jump = heaviest.and_then(|(component, number, sign)| {
             let fails = test(component).filter(|test| !test.passes);
             let p_value = fails.map(|test| test.p_value).or(has_outliers.then_some(outliers.p_value))?;
-            Some((p_value, residual_persistence(&structure.found.model.fit, number), sign))
+            Some((p_value, residual_persistence(&structure.found.model, number), sign))
         });
         if let Some((p_value, persistence, sign)) = jump {
             let named = |signs: &[Sign]| {

@@ -8,6 +8,7 @@
 use estimation::{InnovationComponent, ModelFit, Segment, WHITENESS_Z};
 
 use crate::augmented_model::AugmentedModel;
+use crate::candidate::terms;
 use crate::check::{Check, Component, ResidualPersistence, TestResult};
 use crate::covariate_tests::covariates;
 use crate::null_distribution::{NullDistribution, among_simulated, beyond_simulated};
@@ -42,7 +43,7 @@ pub(crate) struct Outliers {
 
 /// Asks the residuals of a model.
 pub(crate) fn check(model: &AugmentedModel<'_>) -> Checked {
-    let fit = &model.fit;
+    let fit = &*model.fit.with_innovations(&mut terms(&model.candidates));
     let null = NullDistribution::of(model);
     let NoiseTests { mut checks, mut correlation, mut outliers } = noise_tests(fit);
     if let Some(null) = &null {
@@ -253,7 +254,8 @@ fn cancel(fit: &ModelFit<'_>, first: usize, second: usize, wrong: usize) -> bool
 
 /// Persistence of large innovations of a component: the mean of the next ones in the same direction, in
 /// standard errors. Successive displacements start anew, and cannot show a jump.
-pub(crate) fn residual_persistence(fit: &ModelFit<'_>, component: usize) -> ResidualPersistence {
+pub(crate) fn residual_persistence(model: &AugmentedModel<'_>, component: usize) -> ResidualPersistence {
+    let fit = &*model.fit.with_innovations(&mut terms(&model.candidates));
     let series = innovations(fit, component);
     let large = |pair: &&[&InnovationComponent]| pair[0].z.abs() > TAIL_INNOVATION_SIGMAS;
     let follows = |is_next: &dyn Fn(usize, usize) -> bool| {
@@ -278,7 +280,9 @@ mod tests {
     use estimation::{FitSettings, ModelFit};
     use kinematics::{Increment, Pose, Wheels};
 
-    use super::{anscombe_glynn, outliers, whiteness};
+    use super::{anscombe_glynn, outliers, residual_persistence, whiteness};
+    use crate::augmented_model::AugmentedModel;
+    use crate::check::ResidualPersistence;
     use crate::{Options, Verdict, diagnose};
 
     /// Poses of six runs of forty seconds, turning both ways and back and forth, by the nominal robot.
@@ -376,6 +380,25 @@ mod tests {
         let document = diagnosed(alike);
         let names: Vec<&str> = document.findings.iter().map(|finding| finding.id.as_str()).collect();
         assert_eq!(names, ["truth_correlated_noise"]);
+    }
+
+    /// Refits keep no innovations: what asks for them finds them again.
+    #[test]
+    fn errors_that_revert_show_in_a_fit_without_innovations() {
+        let ((mut dataset, paths), mut state) = (driven(), 11);
+        for (number, (run, path)) in dataset.runs.iter_mut().zip(&paths).enumerate() {
+            // Two displacements of every second run are off by 5 mm, one forward and the next one back.
+            run.displacements = displacements(path, |k| {
+                let [x_m, y_m, theta_rad] = error(&mut state);
+                let off_m = if number % 2 == 0 && k == 10 { 5e-3 } else { 0.0 };
+                let off_m = if number % 2 == 0 && k == 11 { -5e-3 } else { off_m };
+                [x_m + off_m, y_m, theta_rad]
+            });
+        }
+        let model = AugmentedModel::base(&fitted(&dataset).without_innovations());
+        assert!(model.fit.solution.pass.innovations.is_empty());
+        // Rejects innovations that were left out taken for none, which are undecided.
+        assert_eq!(residual_persistence(&model, 0), ResidualPersistence::Reverting);
     }
 
     /// A measurement that errs spoils the displacement to it and the one from it; a displacement that errs

@@ -14,6 +14,9 @@ pub(crate) struct Covariances<const N: usize> {
     tt: [f64; N],
 }
 
+/// Row and column of each element.
+const ELEMENTS: [(usize, usize); 6] = [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)];
+
 pub(crate) type Covariance = Covariances<1>;
 
 impl<const N: usize> Covariances<N> {
@@ -109,6 +112,60 @@ impl<const N: usize> Covariances<N> {
             along[2][k] = self.xt[k] * h.x + self.yt[k] * h.y + self.tt[k] * h.z;
         }
         along
+    }
+
+    /// P − A P M − (A P M)ᵀ − K (P − P_x) Kᵀ, with P_x `after`, A `left` and M `right`.
+    #[allow(clippy::needless_range_loop)] // arrays side by side
+    #[inline(always)]
+    pub(super) fn smoothed(
+        &self,
+        after: &Self,
+        gain: &Matrix3<f64>,
+        left: &Matrix3<f64>,
+        right: &Matrix3<f64>,
+    ) -> Self {
+        let (mut learnt, mut after) = (*self, *after);
+        for (learnt, after) in learnt.elements().into_iter().zip(after.elements()) {
+            for k in 0..N {
+                learnt[k] -= after[k];
+            }
+        }
+        let half = self.between(left, right);
+        let learnt = learnt.between(gain, &gain.transpose());
+        let mut smoothed = *self;
+        for (element, (row, column)) in smoothed.elements().into_iter().zip(ELEMENTS) {
+            for k in 0..N {
+                element[k] -= half[row][column][k] + half[column][row][k] + learnt[row][column][k];
+            }
+        }
+        smoothed
+    }
+
+    /// A P M.
+    #[allow(clippy::needless_range_loop)] // arrays side by side
+    #[inline(always)]
+    fn between(&self, left: &Matrix3<f64>, right: &Matrix3<f64>) -> [[[f64; N]; 3]; 3] {
+        let Self { xx, xy, yy, xt, yt, tt } = self;
+        let rows = [[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]];
+        let mut half = [[[0.0; N]; 3]; 3];
+        let mut product = [[[0.0; N]; 3]; 3];
+        for row in 0..3 {
+            for column in 0..3 {
+                for k in 0..N {
+                    half[row][column][k] = left[(row, 0)] * rows[0][column][k]
+                        + left[(row, 1)] * rows[1][column][k]
+                        + left[(row, 2)] * rows[2][column][k];
+                }
+            }
+            for column in 0..3 {
+                for k in 0..N {
+                    product[row][column][k] = half[row][0][k] * right[(0, column)]
+                        + half[row][1][k] * right[(1, column)]
+                        + half[row][2][k] * right[(2, column)];
+                }
+            }
+        }
+        product
     }
 
     /// P′ − P′h kᵀ − k (P′h)ᵀ + s′ k kᵀ.

@@ -11,7 +11,7 @@ use nalgebra::{Matrix3, Vector3, Vector4};
 
 use crate::covariances::{Covariance, Covariances};
 use crate::derivatives::Derivatives;
-use crate::filter_state::{FilterState, Step};
+use crate::filter_state::{FilterState, Step, Update};
 use crate::kinematic_samples::KinematicSample;
 use crate::model::{Column, Instrument, Model};
 use crate::noise::{NOISES, Noise, NoiseComponent};
@@ -65,9 +65,9 @@ pub(super) struct Filter<'f, 'a> {
     pub(super) outliers: Vec<usize>,
     pub(super) noise_score: NoiseScore,
     pub(super) timing: TimingScore,
-    /// Derivatives of a component of the measurement by each column: directly, and in all.
+    /// Derivatives of a component of the measurement by each column directly, and in all of each component.
     direct: Vec<f64>,
-    j: Vec<f64>,
+    j: [Vec<f64>; 3],
 }
 
 /// Filters a segment's measurements at the ends of some propagation intervals, from a free start heading.
@@ -163,7 +163,7 @@ impl<'f, 'a> Filter<'f, 'a> {
             noise_score: NoiseScore::zero(),
             timing: TimingScore::default(),
             direct: vec![0.0; all],
-            j: vec![0.0; all],
+            j: [(); 3].map(|()| vec![0.0; all]),
         }
     }
 
@@ -220,7 +220,7 @@ impl<'f, 'a> Filter<'f, 'a> {
         if free {
             // The instrument's heading is the parameter, the drive's centre follows it round the instrument.
             self.sums.free = true;
-            let last = self.j.len() - 1;
+            let last = self.direct.len() - 1;
             self.by.set(last, self.lever(&measured));
         }
     }
@@ -365,9 +365,10 @@ impl<'f, 'a> Filter<'f, 'a> {
         let mounted = Vector3::new(cos * lx - sin * ly, sin * lx + cos * ly, 0.0);
         // A late measurement is off by how far the instrument moved meanwhile.
         let twists = self.twists_before(propagation.intervals.end, measured.t_s, twist);
-        let [moved, by_latency] = twists.map(|Twist { v_m_s, omega_rad_s }| {
+        let sensor_velocity = |Twist { v_m_s, omega_rad_s }: Twist| {
             Vector3::new(cos * v_m_s - omega_rad_s * mounted.y, sin * v_m_s + omega_rad_s * mounted.x, omega_rad_s)
-        });
+        };
+        let (moved, by_latency) = (sensor_velocity(twists[0]), sensor_velocity(twists[1]));
         let mut sum_of_terms = Vector3::zeros();
         for (number, size) in self.model.term_values.iter().enumerate().filter(|(_, size)| **size != 0.0) {
             sum_of_terms += *size * self.by_measurement.get(number);
@@ -389,16 +390,19 @@ impl<'f, 'a> Filter<'f, 'a> {
             Some(errors) => errors.whitened(axes, self.instrument_variance()),
             None => Whitened { axes, variance: [xy, xy, theta] },
         };
-        let rows = axes.map(|axis| Vector3::new(axis.x, axis.y, axis.dot(&by_heading)));
+        let mut rows = axes;
+        for row in &mut rows {
+            row.z = row.dot(&by_heading);
+        }
         let (mut covariance, mut correction, mut distance) = (self.covariance, Vector3::zeros(), 0.0);
         let (mut turned, mut error_by, mut velocity_by) = (Vector3::zeros(), 0.0, 0.0);
-        let measured = [0, 1, 2].map(|component| {
-            if component >= components {
-                return Update { row: Vector3::zeros(), gain: Vector3::zeros(), v: 0.0, s: 1.0 };
-            }
+        // A loop, and no closure over an array: that would be called, without the kernel's instructions.
+        let mut measured = [Update::NOTHING; 3];
+        for (component, update) in measured.iter_mut().enumerate().take(components) {
             let row = rows[component];
             let v = axes[component].dot(&error) - row.dot(&correction);
-            let ph = Vector3::from(covariance.along(&row).map(|[along]| along));
+            let [[x], [y], [theta]] = covariance.along(&row);
+            let ph = Vector3::new(x, y, theta);
             let s = row.dot(&ph) + r[component];
             let gain = ph * (1.0 / s);
             distance += v * v / s;
@@ -408,8 +412,8 @@ impl<'f, 'a> Filter<'f, 'a> {
             error_by += velocity * v / s;
             velocity_by += velocity * velocity / s;
             covariance.lower(&gain, &ph);
-            Update { row, gain, v, s }
-        });
+            *update = Update { row, gain, v, s };
+        }
         if self.pass_options.gate == OutlierGate::On && distance > OUTLIER_CHI_SQUARE {
             return false;
         }
@@ -438,10 +442,9 @@ impl<'f, 'a> Filter<'f, 'a> {
             {
                 *direct = measurement;
             }
-            for ((j, by), direct) in self.j.iter_mut().zip(self.by.along(row)).zip(&self.direct) {
+            for ((j, by), direct) in self.j[component].iter_mut().zip(self.by.along(row)).zip(&self.direct) {
                 *j = -by - direct;
             }
-            self.sums.add(&self.j, v, s);
             if self.pass_options.innovations {
                 let sigma = s.sqrt();
                 self.innovations.push(InnovationComponent {
@@ -452,7 +455,13 @@ impl<'f, 'a> Filter<'f, 'a> {
                     sigma,
                 });
             }
-            self.by.add(gain, &self.j);
+            self.by.add(gain, &self.j[component]);
+        }
+        let ([along, across, heading], [a, b, c]) = (&self.j, &measured);
+        if components == 3 {
+            self.sums.add([along, across, heading], [a.v, b.v, c.v], [a.s, b.s, c.s]);
+        } else {
+            self.sums.add([along, across], [a.v, b.v], [a.s, b.s]);
         }
         self.pose =
             Pose::new(self.pose.x_m + correction.x, self.pose.y_m + correction.y, self.pose.theta_rad + correction.z);
@@ -485,15 +494,4 @@ impl<'f, 'a> Filter<'f, 'a> {
         self.noise_score.gradient += s_by * (0.5 * (1.0 - v * v * per_s)) + v_by * (v * per_s);
         self.noise_score.information += s_by * s_by.transpose() * 0.5 + v_by * v_by.transpose() * per_s;
     }
-}
-
-/// What one component of a measurement changes.
-#[derive(Clone, Copy)]
-struct Update {
-    /// Its derivative by the pose.
-    row: Vector3<f64>,
-    gain: Vector3<f64>,
-    /// Innovation, the components before it taken into account, and its variance.
-    v: f64,
-    s: f64,
 }

@@ -62,3 +62,19 @@ impl FilterState<'_> {
         }
     }
 }
+
+/// What one component of a measurement changes.
+#[derive(Clone, Copy)]
+pub(crate) struct Update {
+    /// Its derivative by the pose.
+    pub(crate) row: Vector3<f64>,
+    pub(crate) gain: Vector3<f64>,
+    /// Innovation, the components before it taken into account, and its variance.
+    pub(crate) v: f64,
+    pub(crate) s: f64,
+}
+
+impl Update {
+    pub(crate) const NOTHING: Self =
+        Self { row: Vector3::new(0.0, 0.0, 0.0), gain: Vector3::new(0.0, 0.0, 0.0), v: 0.0, s: 1.0 };
+}

@@ -53,6 +53,7 @@ mod segment;
 mod settings;
 #[cfg(test)]
 mod tests;
+mod thinned_fit;
 mod thinning;
 mod timing_noise;
 mod wheel_angles;

@@ -18,9 +18,8 @@ use crate::pass_options::{OutlierGate, PassOptions};
 use crate::records::Records;
 use crate::segment::Segment;
 use crate::settings::{
-    MAX_AUTOCORRELATION_LAG, MAX_OBSERVABLE_SIGMA, MIN_CLUSTERS, MIN_MEASUREMENTS_PER_RUN, MIN_NAMED_DIRECTION,
-    MIN_OWN_DIRECTION, MIN_RUNS_TO_HOLD_OUT, MIN_SPARE_CLUSTERS, ROTATED_SENSOR_RAD, SPACING_SLACK, THINNING_FACTOR,
-    THINNING_PHASES, WHITENESS_Z,
+    MAX_AUTOCORRELATION_LAG, MAX_OBSERVABLE_SIGMA, MIN_CLUSTERS, MIN_NAMED_DIRECTION, MIN_OWN_DIRECTION,
+    MIN_RUNS_TO_HOLD_OUT, MIN_SPARE_CLUSTERS, ROTATED_SENSOR_RAD, WHITENESS_Z,
 };
 use crate::thinning::{Selection, Thinning};
 
@@ -158,32 +157,6 @@ impl ModelFit<'_> {
     pub(crate) fn current_values(&self) -> InitialValues {
         let Solution { model, noise, free_headings, .. } = &self.solution;
         InitialValues { model: model.clone(), noise: Some(*noise), free_headings: Some(free_headings.clone()) }
-    }
-
-    /// Thins measurements until their innovations are white, or a run has too few left.
-    pub(crate) fn thin(&mut self) -> Result<(), EstimationError> {
-        let Some(between_s) = median_between(&self.records) else { return Ok(()) };
-        let mut every_s = between_s;
-        while !self.is_white() {
-            every_s *= THINNING_FACTOR;
-            let Some((thinning, selections)) = self.thinned(every_s, between_s) else { break };
-            (self.selections, self.thinning) = (Arc::new(selections), thinning);
-            self.refit(Some(self.current_values()), &mut [])?;
-        }
-        Ok(())
-    }
-
-    /// Measurements at a spacing of `every_s`, seconds; `None` when a run has too few left.
-    fn thinned(&self, every_s: f64, between_s: f64) -> Option<(Thinning, Vec<Selection>)> {
-        let thinning = Thinning { every_s: every_s - SPACING_SLACK * between_s, phases: THINNING_PHASES };
-        let selections = Selection::of(&self.records, thinning, &self.nominal);
-        (selections[0].mean_measurements(&self.records) >= MIN_MEASUREMENTS_PER_RUN).then_some((thinning, selections))
-    }
-
-    /// Does [`Self::thin`] leave measurements out?
-    pub(crate) fn is_to_be_thinned(&self) -> bool {
-        let between_s = median_between(&self.records).filter(|_| !self.is_white());
-        between_s.is_some_and(|between_s| self.thinned(THINNING_FACTOR * between_s, between_s).is_some())
     }
 
     pub(crate) fn is_white(&self) -> bool {
@@ -484,14 +457,4 @@ fn geometry_information(matrix: &DMatrix<f64>) -> Matrix3<f64> {
         DMatrix::zeros(3, 3)
     };
     Matrix3::from_iterator((own - rest).iter().copied())
-}
-
-/// Median time between measurements.
-fn median_between(records: &Records<'_>) -> Option<f64> {
-    let mut between: Vec<f64> = records.times_between().collect();
-    if between.is_empty() {
-        return None;
-    }
-    let middle = between.len() / 2;
-    Some(*between.select_nth_unstable_by(middle, f64::total_cmp).1)
 }

@@ -146,7 +146,8 @@ pub(crate) fn fit_from(
     if from.noise.is_none() {
         // The noise is scaled to the median, which is robust to outliers, before these are rejected.
         for round in 1..=MAX_UNGATED_STEPS {
-            let pass_options = PassOptions { innovations: true, gate: OutlierGate::Off, ..PassOptions::default() };
+            let (gate, free) = (OutlierGate::Off, Some(&options.columns[..]));
+            let pass_options = PassOptions { innovations: true, gate, free, ..PassOptions::default() };
             let found = pass(records, selections, &model, &noise, &headings, terms, pass_options);
             let mean = MeanStep::of(&found, options, &basis)?;
             let (_, own) = take_step(&mut model, &mut headings, &found, options, mean.by)?;
@@ -171,11 +172,12 @@ pub(crate) fn fit_from(
     let pass_options = PassOptions {
         noise_score: !options.noise_fixed,
         gate: OutlierGate::of(options.ungated),
+        free: Some(&options.columns),
         ..PassOptions::default()
     };
     let (mut converged, mut left_basin, mut first) = (false, false, None);
     let (mut damping, mut acceleration) = (StepDamping::default(), Acceleration::default());
-    let keep = Selection::has_long_propagations(selections);
+    let keep = Selection::has_long_propagations(selections, !terms.is_empty());
     let (mut cached, mut confirms): (Option<CachedPropagation>, bool) = (None, false);
     // Squared distance of the model from that of the cached propagations.
     let mut moved_since_cached = 0.0;

@@ -373,7 +373,7 @@ impl<'f> PartialFilter<'f> {
             j[Column::GyroScale.index()] -= turn_rad;
         }
         j.resize(columns + 1, 0.0);
-        sums.add(&j, v, s);
+        sums.add([&j], [v], [s]);
         self.score_noise(&row, &gain, v, s);
         self.state += &gain * v;
         self.covariance -= &gain * ph.transpose();
@@ -403,7 +403,7 @@ impl<'f> PartialFilter<'f> {
             let sigma = lower[(component, component)];
             let mut j: Vec<f64> = whitened_by.row(component).iter().map(|by| by * sigma).collect();
             j.resize(columns + 1, 0.0);
-            sums.add(&j, whitened[component] * sigma, sigma * sigma);
+            sums.add([&j], [whitened[component] * sigma], [sigma * sigma]);
         }
         let inverse = root.inverse();
         let gain = &ph * inverse;

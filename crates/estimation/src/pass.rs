@@ -87,7 +87,9 @@ pub(crate) fn pass(
     pass_options: PassOptions<'_>,
 ) -> Pass {
     let columns = Column::BASE.len() + terms.iter().map(|term| term.parameters().len()).sum::<usize>();
-    let products = Products::of(columns, pass_options.parts);
+    // Where groups have instruments of their own, these are columns to solve for, too.
+    let free = pass_options.free.filter(|_| model.own.is_none());
+    let products = Products::of(columns, pass_options.parts, free);
     let mut result = Pass::nothing();
     let weight = 1.0 / selections.len() as f64;
     let runs = runs(&records.segments);

@@ -1,5 +1,6 @@
 //! What a pass carries along, and which measurements it takes.
 
+use crate::model::Column;
 use crate::propagation::CachedPropagation;
 
 /// Whether measurements whose innovation is improbable are rejected.
@@ -34,4 +35,7 @@ pub(crate) struct PassOptions<'p> {
     /// The last columns come in parts of so many, each tested for itself: columns of two parts have no
     /// products with each other.
     pub(crate) parts: &'p [usize],
+    /// The columns that the normal equations are solved for: those of two others have no products. `None`:
+    /// all products are taken.
+    pub(crate) free: Option<&'p [Column]>,
 }

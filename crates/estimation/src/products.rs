@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::model::Column;
 use crate::normal_equations::NormalEquations;
 use crate::settings::MIN_VARIANCE_PRODUCT;
 
@@ -11,6 +12,8 @@ use crate::settings::MIN_VARIANCE_PRODUCT;
 pub(crate) struct Products {
     /// Number of the first columns, which have products with all.
     common: usize,
+    /// Those of the first columns whose products are taken, in order.
+    rows: Vec<usize>,
     /// For each further column, the first of those of its part: it has products with these.
     first: Vec<usize>,
 }
@@ -18,13 +21,17 @@ pub(crate) struct Products {
 impl Products {
     /// Of so many columns, the last of which come in parts: those of a part have products with what comes
     /// before all parts, and with each other.
-    pub(crate) fn of(columns: usize, parts: &[usize]) -> Self {
+    ///
+    /// A fit steps along its `free` columns alone: products of two others stay zero. `None`: all are taken.
+    pub(crate) fn of(columns: usize, parts: &[usize], free: Option<&[Column]>) -> Self {
         let common = columns - parts.iter().sum::<usize>();
+        let is_taken = |row: &usize| free.is_none_or(|free| free.iter().any(|column| column.index() == *row));
+        let rows = (0..common).filter(is_taken).collect();
         let mut first = Vec::new();
         for part in parts {
             first.extend(std::iter::repeat_n(common + first.len(), *part));
         }
-        Self { common, first }
+        Self { common, rows, first }
     }
 }
 
@@ -67,44 +74,48 @@ impl<'p> Sums<'p> {
         }
     }
 
-    /// Adds an innovation v of variance s with derivatives j.
+    /// Adds innovations v of variances s, uncorrelated, with derivatives j: all components of a measurement
+    /// at once, as sums are read and written once for them.
     #[inline(always)]
-    pub(crate) fn add(&mut self, j: &[f64], v: f64, s: f64) {
-        let per_s = 1.0 / s;
-        for (gradient, j) in self.gradient.iter_mut().zip(j) {
-            *gradient += per_s * v * j;
+    pub(crate) fn add<const N: usize>(&mut self, j: [&[f64]; N], v: [f64; N], s: [f64; N]) {
+        let Self { products, columns, common, own, gradient, .. } = self;
+        let (mut per_s, mut pull) = ([0.0; N], [0.0; N]);
+        for k in 0..N {
+            per_s[k] = 1.0 / s[k];
+            pull[k] = per_s[k] * v[k];
         }
-        let last = if self.free { Some(&j[self.columns - 1]) } else { None };
-        for (row, a) in self.common.chunks_exact_mut(self.columns).zip(j[..self.products.common].iter().chain(last)) {
-            let scaled = a * per_s;
-            for (out, b) in row.iter_mut().zip(j) {
-                *out += scaled * b;
-            }
+        add_multiples(gradient, j, pull);
+        // Products with the columns before it stand in their rows; those of the heading are read as a whole.
+        let heading = self.free.then_some((products.common, *columns - 1, 0));
+        for (row, column, from) in products.rows.iter().map(|row| (*row, *row, *row)).chain(heading) {
+            let scaled = scaled_column(j, column, per_s);
+            add_multiples(&mut common[row * *columns + from..(row + 1) * *columns], beyond(j, from), scaled);
         }
-        if self.own.len() == self.products.first.len() {
+        if own.len() == products.first.len() {
             // All parts are of one column, as they mostly are: many at a time.
-            for (out, j) in self.own.iter_mut().zip(&j[self.products.common..]) {
-                *out += j * per_s * j;
+            for (own_j, per_s) in beyond(j, products.common).into_iter().zip(per_s) {
+                for (out, j) in own.iter_mut().zip(own_j) {
+                    *out += j * per_s * j;
+                }
             }
         } else {
-            let mut own = &mut self.own[..];
-            for (further, &first) in self.products.first.iter().enumerate() {
-                let column = self.products.common + further;
+            let mut own = &mut own[..];
+            for (further, &first) in products.first.iter().enumerate() {
+                let column = products.common + further;
                 let (out, rest) = own.split_at_mut(column + 1 - first);
-                let scaled = j[column] * per_s;
-                for (out, b) in out.iter_mut().zip(&j[first..]) {
-                    *out += scaled * b;
-                }
+                add_multiples(out, beyond(j, first), scaled_column(j, column, per_s));
                 own = rest;
             }
         }
-        self.chi_square += v * v * per_s;
-        self.det *= s;
-        if !(MIN_VARIANCE_PRODUCT..=MIN_VARIANCE_PRODUCT.recip()).contains(&self.det) {
-            self.log_det += self.det.ln();
-            self.det = 1.0;
+        for k in 0..N {
+            self.chi_square += v[k] * pull[k];
+            self.det *= s[k];
+            if !(MIN_VARIANCE_PRODUCT..=MIN_VARIANCE_PRODUCT.recip()).contains(&self.det) {
+                self.log_det += self.det.ln();
+                self.det = 1.0;
+            }
+            self.count += 1.0;
         }
-        self.count += 1.0;
     }
 
     /// The products of all columns but the heading; those that are not taken are zero.
@@ -114,8 +125,9 @@ impl<'p> Sums<'p> {
             information[(row, column)] = value;
             information[(column, row)] = value;
         };
-        for (row, products) in self.common.chunks_exact(self.columns).take(self.products.common).enumerate() {
-            products[row..columns].iter().enumerate().for_each(|(beyond, value)| set(row, row + beyond, *value));
+        for &row in &self.products.rows {
+            let products = &self.common[row * self.columns..][..columns];
+            products[row..].iter().enumerate().for_each(|(beyond, value)| set(row, row + beyond, *value));
         }
         let mut own = self.own.iter();
         for (further, &first) in self.products.first.iter().enumerate() {
@@ -152,5 +164,38 @@ impl<'p> Sums<'p> {
         equations.log_det += own.ln();
         equations.count -= 1.0;
         (equations, Some((-gradient / own, by)))
+    }
+}
+
+// Loops, and no closures over arrays: these would be called, and compiled without the kernel's instructions.
+
+/// The rows from a column on.
+#[inline(always)]
+fn beyond<const N: usize>(mut rows: [&[f64]; N], from: usize) -> [&[f64]; N] {
+    for row in &mut rows {
+        *row = &row[from..];
+    }
+    rows
+}
+
+/// The rows' values in a column, each times its factor.
+#[inline(always)]
+fn scaled_column<const N: usize>(rows: [&[f64]; N], column: usize, mut by: [f64; N]) -> [f64; N] {
+    for (by, row) in by.iter_mut().zip(rows) {
+        *by *= row[column];
+    }
+    by
+}
+
+/// Adds to `out` as many values of each row as it has, times the row's factor.
+#[inline(always)]
+fn add_multiples<const N: usize>(out: &mut [f64], mut rows: [&[f64]; N], by: [f64; N]) {
+    for row in &mut rows {
+        *row = &row[..out.len()];
+    }
+    for (at, out) in out.iter_mut().enumerate() {
+        for k in 0..N {
+            *out += by[k] * rows[k][at];
+        }
     }
 }

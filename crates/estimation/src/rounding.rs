@@ -70,6 +70,7 @@ impl PoseVariance {
     }
 
     /// Q in the room, for a heading.
+    #[inline(always)]
     pub(crate) fn in_room(&self, theta_rad: f64) -> Matrix3<f64> {
         let (sin, cos) = sin_cos(theta_rad);
         let (along, with) = (self.along_m2, self.covariance_m_rad);
@@ -187,7 +188,11 @@ impl Rounding {
         }
     }
 
-    /// The same step, differentiated by the logarithm of each variance: K′ = (I − K) P′ (P + Q)⁻¹.
+    /// The same step, differentiated by the logarithm of each variance: K′ = (I − K) P′ (P + Q)⁻¹, and with
+    /// A = I − K, L = P + Q − P_x, M = (P + Q)⁻¹ L Kᵀ
+    ///
+    /// P⁺′ = P′ − A P′ M − (A P′ M)ᵀ − K (P′ − P_x′) Kᵀ.
+    #[inline(always)]
     fn leave_noise(
         &self,
         state: &mut FilterState<'_>,
@@ -195,19 +200,19 @@ impl Rounding {
         (learnt, moved): (&Matrix3<f64>, Vector3<f64>),
         by_noise: &[[f64; NOISES]; 3],
     ) {
-        let mut covariances = [Matrix3::zeros(); NOISES];
-        for (a, covariance) in covariances.iter_mut().enumerate() {
-            let (before, after) = (self.covariance_by.matrix(a), state.covariance_by.matrix(a));
-            let gain_by = (Matrix3::identity() - gain) * before * inverse;
-            let half = gain_by * learnt * gain.transpose();
-            *covariance = before - half - half.transpose() - gain * (before - after) * gain.transpose();
-            let of = |by: &[[f64; NOISES]; 3]| Vector3::new(by[0][a], by[1][a], by[2][a]);
-            let (from, to) = (of(by_noise), of(state.pose_by_noise));
-            let by = from + gain_by * moved + gain * (to - from);
-            for (row, by) in state.pose_by_noise.iter_mut().zip(by.iter()) {
-                row[a] = *by;
+        let left = Matrix3::identity() - gain;
+        let by_gain = self.covariance_by.along(&(inverse * moved));
+        let after = *state.pose_by_noise;
+        for row in 0..3 {
+            for a in 0..NOISES {
+                let mut by = by_noise[row][a];
+                for k in 0..3 {
+                    by += left[(row, k)] * by_gain[k][a] + gain[(row, k)] * (after[k][a] - by_noise[k][a]);
+                }
+                state.pose_by_noise[row][a] = by;
             }
         }
-        *state.covariance_by = Covariances::of(covariances.each_ref());
+        let right = inverse * learnt * gain.transpose();
+        *state.covariance_by = self.covariance_by.smoothed(state.covariance_by, gain, &left, &right);
     }
 }

@@ -105,13 +105,14 @@ impl Selection {
         self.propagations.iter().all(Vec::is_empty) && self.partial.iter().all(Option::is_none)
     }
 
-    /// Whether integrating the propagations takes longer than all else in a pass, so that caching them is
-    /// worth it. With that many intervals a standard deviation is so small a step that cached propagations
-    /// follow it to first order.
-    pub(crate) fn has_long_propagations(all: &[Self]) -> bool {
+    /// Whether integrating the propagations, with terms or without, takes so long that caching them is worth
+    /// it. With that many intervals a standard deviation is so small a step that cached propagations follow
+    /// it to first order.
+    pub(crate) fn has_long_propagations(all: &[Self], with_terms: bool) -> bool {
         let propagations = || all.iter().flat_map(|selection| &selection.propagations).flatten();
         let intervals: usize = propagations().map(|propagation| propagation.intervals.len()).sum();
-        intervals >= MIN_CACHED_INTERVALS && intervals >= MIN_INTERVALS_PER_CACHED_PROPAGATION * propagations().count()
+        let least = if with_terms { 1 } else { MIN_INTERVALS_PER_CACHED_PROPAGATION };
+        intervals >= MIN_CACHED_INTERVALS && intervals >= least * propagations().count()
     }
 
     /// Mean number of measurements of a series that has any, without its start. A series is a segment of

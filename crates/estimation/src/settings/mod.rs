@@ -5,12 +5,14 @@
 //! what it says. `Convention:` is customary. `Published:` names author, year and equation.
 
 mod partial;
+mod thinning;
 
 pub(crate) use partial::{
     BIAS_WALK_RADPS, GYRO_BIAS_SIGMA_RADPS, GYRO_WINDOW_S, MIN_DISTANCE_M, MIN_GYRO_NOISE_RAD_PER_SQRT_S,
     MIN_STANDING_PAIRS, START_HEADING_SIGMA_RAD, START_POSITION_SIGMA_M, WALL_DIRECTION_SIGMA_RAD, WALL_OFFSET_SIGMA_M,
     WALL_START_DIRECTIONS, WALL_START_STEPS,
 };
+pub(crate) use thinning::{MIN_MEASUREMENTS_PER_RUN, SPACING_SLACK, THINNING_FACTOR, THINNING_PHASES};
 
 // Numbers of arithmetic.
 
@@ -205,7 +207,7 @@ pub(crate) const RESTART_AFTER_OUTLIERS: u32 = 2;
 /// Tuned: by hand; no record of what on.
 pub(crate) const MIN_OUTLIER_REDUCTION: usize = 2;
 
-// Whiteness and thinning.
+// Whiteness; thinning has a file of its own.
 
 /// Autocorrelation of the innovations, standard errors, below which they count as white.
 /// Derived: two-sided level of 1 % over three components together, Φ⁻¹(1 − 0.01/6).
@@ -218,22 +220,6 @@ pub(crate) const MAX_AUTOCORRELATION_LAG: i32 = 5;
 /// Weight of a pair of displacements for each further measurement between them.
 /// Derived: autocorrelation that is worth finding lasts for about three displacements, e^(−1/3).
 pub(crate) const AUTOCORRELATION_DECAY: f64 = 0.7;
-
-/// Phases in which thinned measurements are taken.
-/// Tuned: by hand; no record of what on.
-pub(crate) const THINNING_PHASES: usize = 4;
-
-/// Factor from one thinning to the next.
-/// Convention: doubling.
-pub(crate) const THINNING_FACTOR: f64 = 2.0;
-
-/// Share of a measurement's interval by which the spacing may be short: instruments jitter.
-/// Derived: half of an interval, so that jitter does not pass over the measurement that is due.
-pub(crate) const SPACING_SLACK: f64 = 0.5;
-
-/// Fewest measurements of a run, on average, that thinning leaves.
-/// Derived: with fewer a run would be no more than its ends.
-pub(crate) const MIN_MEASUREMENTS_PER_RUN: f64 = 1.0;
 
 // Observability and covariance.
 
@@ -356,8 +342,8 @@ pub(crate) const ABSOLUTE_DAMPING: f64 = 1e-9;
 /// Budgeted: about ten milliseconds of a pass.
 pub(crate) const MIN_CACHED_INTERVALS: usize = 100_000;
 
-/// Intervals of a propagation, on average, from which on propagations are cached.
-/// Budgeted: integrating them then takes longer than all else in a pass.
+/// Intervals of a propagation, on average, from which on propagations without terms are cached.
+/// Budgeted: integrating them then takes longer than all else in a pass. With terms, single intervals do.
 pub(crate) const MIN_INTERVALS_PER_CACHED_PROPAGATION: usize = 3;
 
 /// Squared step of the mean over its variance below which cached propagations serve the next step.

@@ -173,6 +173,35 @@ fn parts_have_all_products_but_those_with_each_other() {
     assert!((grouping.gradient - &all.gradient).norm() <= 1e-14 * all.gradient.norm());
 }
 
+#[test]
+fn a_fit_sums_the_products_that_it_steps_along() {
+    // Without headings, so that the start heading is eliminated from the products, too.
+    let dataset = dataset(false);
+    let records = Records::of(&[dataset.session()]);
+    let selections = Selection::of(&records, Thinning::NONE, &MODEL);
+    let model = Model { term_values: vec![0.004, -0.003], ..MODEL };
+    let headings = vec![0.5; records.segments.len()];
+    let summed = |free, parts: &[usize]| {
+        let mut terms: Vec<Box<dyn ModelTerm>> = vec![Box::new(TravelTerm)];
+        // The second run's heading is a radian off: ungated, so that its measurements are taken.
+        let pass_options = PassOptions { free, parts, gate: OutlierGate::Off, ..PassOptions::default() };
+        total(&pass(&records, &selections, &model, &NOISE, &headings, &mut terms, pass_options).runs).expect("runs")
+    };
+    let free = [Column::LeftWheel, Column::Separation, Column::Term(1)];
+    let (all, own) = (summed(None, &[]), summed(Some(&free[..]), &[]));
+    // The same sums in the same order. Rejects a row that is left out or read from another place.
+    assert_eq!(own.of(&free), all.of(&free));
+    assert_eq!(own.gradient, all.gradient);
+    // One part of all terms has all products, too. Rejects products of the heading with other columns that
+    // are lost where its row has its column's number, as without parts: the difference is then of order 1.
+    // Rounding is of some 1e-16 of each sum.
+    let in_part = summed(None, &[2]);
+    assert!((&in_part.information - &all.information).norm() <= 1e-13 * all.information.norm());
+    // Two columns along which nothing steps have no products of their own, but for the eliminated heading.
+    let (x, y) = (Column::SensorX.index(), Column::SensorY.index());
+    assert_ne!(own.information[(x, y)], all.information[(x, y)]);
+}
+
 const BODY_FROM_SENSOR: Pose = Pose::new(0.03, -0.02, 0.1);
 
 /// About a standard deviation from the true model.

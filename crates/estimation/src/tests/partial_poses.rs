@@ -142,7 +142,7 @@ fn poses_are_what_they_are_in_their_own_filter() {
     let selections = Selection::of(&records, Thinning::NONE, &nominal());
     let (model, noise) = (near_truth(), noise());
     let poses = TakenPoses::of(&records.segments, &[], &selections[0].propagations, &[]);
-    let products = Products::of(Column::BASE.len(), &[]);
+    let products = Products::of(Column::BASE.len(), &[], None);
     let own = passed(&poses_alone(dataset.clone()), &model, &noise);
     let mut score = crate::noise_score::NoiseScore::zero();
     for ((partial, propagations), own) in records.partial.iter().zip(&selections[0].partial).zip(&own.runs) {

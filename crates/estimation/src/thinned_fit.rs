@@ -1,0 +1,69 @@
+//! Fits of thinned measurements: the spacing at which innovations are white; and fits that leave their
+//! innovations out.
+
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use model_term::ModelTerm;
+
+use crate::error::EstimationError;
+use crate::model_fit::ModelFit;
+use crate::records::Records;
+use crate::settings::{MIN_MEASUREMENTS_PER_RUN, SPACING_SLACK, THINNING_FACTOR, THINNING_PHASES};
+use crate::thinning::{Selection, Thinning};
+
+impl ModelFit<'_> {
+    /// Thins measurements until their innovations are white, or a run has too few left.
+    pub(crate) fn thin(&mut self) -> Result<(), EstimationError> {
+        let Some(between_s) = median_between(&self.records) else { return Ok(()) };
+        let mut every_s = between_s;
+        while !self.is_white() {
+            every_s *= THINNING_FACTOR;
+            let Some((thinning, selections)) = self.thinned(every_s, between_s) else { break };
+            (self.selections, self.thinning) = (Arc::new(selections), thinning);
+            self.refit(Some(self.current_values()), &mut [])?;
+        }
+        Ok(())
+    }
+
+    /// Measurements at a spacing of `every_s`, seconds; `None` when a run has too few left.
+    fn thinned(&self, every_s: f64, between_s: f64) -> Option<(Thinning, Vec<Selection>)> {
+        let thinning = Thinning { every_s: every_s - SPACING_SLACK * between_s, phases: THINNING_PHASES };
+        let selections = Selection::of(&self.records, thinning, &self.nominal);
+        (selections[0].mean_measurements(&self.records) >= MIN_MEASUREMENTS_PER_RUN).then_some((thinning, selections))
+    }
+
+    /// Does [`Self::thin`] leave measurements out?
+    pub(crate) fn is_to_be_thinned(&self) -> bool {
+        let between_s = median_between(&self.records).filter(|_| !self.is_white());
+        between_s.is_some_and(|between_s| self.thinned(THINNING_FACTOR * between_s, between_s).is_some())
+    }
+
+    /// The fit without its innovations, most of its memory; [`Self::with_innovations`] finds them again.
+    #[must_use]
+    pub fn without_innovations(mut self) -> Self {
+        self.solution.pass.innovations = Vec::new();
+        self
+    }
+
+    /// The fit with its innovations, by a pass where they were left out. `terms` are those of the fit.
+    #[must_use]
+    pub fn with_innovations(&self, terms: &mut [Box<dyn ModelTerm>]) -> Cow<'_, Self> {
+        if !self.solution.pass.innovations.is_empty() {
+            return Cow::Borrowed(self);
+        }
+        let mut whole = self.clone();
+        whole.solution.pass.innovations = self.scan(terms).innovations;
+        Cow::Owned(whole)
+    }
+}
+
+/// Median time between measurements.
+fn median_between(records: &Records<'_>) -> Option<f64> {
+    let mut between: Vec<f64> = records.times_between().collect();
+    if between.is_empty() {
+        return None;
+    }
+    let middle = between.len() / 2;
+    Some(*between.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
