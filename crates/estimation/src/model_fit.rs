@@ -96,7 +96,8 @@ impl ModelFit<'_> {
     /// The values found, with records that hold no measurements.
     pub(crate) fn with_records<'b>(self, records: Records<'b>) -> ModelFit<'b> {
         let Self { thinning, nominal, start, solution, columns, unobservable, prior, ends, parts, .. } = self;
-        let pass = Pass { innovations: Vec::new(), outliers: Vec::new(), ..solution.pass };
+        let pass =
+            Pass { innovations: Vec::new(), outliers: Vec::new(), partial_outliers: Vec::new(), ..solution.pass };
         let solution = Solution { pass, ..solution };
         let (displacements_in_series, ungated) = (self.displacements_in_series, self.ungated);
         ModelFit {

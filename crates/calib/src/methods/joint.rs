@@ -13,7 +13,8 @@
 
 use dataset::{Blocks, DatasetError, Session, Warning};
 use estimation::{
-    Column, FitSettings, Grouping, LargeFit, Model, ModelFit, NoiseComponent, OneStepError, Records, fit_large,
+    Column, FitSettings, Grouping, LargeFit, Model, ModelFit, NoiseComponent, OneStepError, PartialOutliers, Records,
+    fit_large,
 };
 use kinematics::Pose;
 use motion_programs::Schedule;
@@ -194,7 +195,7 @@ fn why_not(records: &Records<'_>, direction: &Vector3<f64>) -> Option<&'static s
     })
 }
 
-/// Runs without use and runs of which no measurement fitted.
+/// Runs without use, runs of which no measurement fitted, and partial measurements that are outliers.
 fn rejected(fit: &ModelFit<'_>) -> Vec<Rejected> {
     let id = |run: (usize, usize)| fit.records.ids[run.0][run.1].clone();
     let unused = fit.records.unused.iter().map(|run| Rejected {
@@ -205,7 +206,12 @@ fn rejected(fit: &ModelFit<'_>) -> Vec<Rejected> {
         run: id(run.run),
         why: "what the instrument measured lies far outside of what wheels and noise explain".to_owned(),
     });
-    unused.chain(far).collect()
+    let partial = fit.partial_outliers().into_iter().map(|PartialOutliers { run, rejected, of }| {
+        let kinds: Vec<String> = rejected.iter().map(|(kind, count)| format!("{count} {kind}")).collect();
+        let why = format!("of its {of} partial measurements as outliers: {}; the others count", kinds.join(", "));
+        Rejected { run: id(run), why }
+    });
+    unused.chain(far).chain(partial).collect()
 }
 
 /// The instruments of groups, by the sessions' names.
