@@ -233,8 +233,10 @@ fn list(arguments: &Arguments, terminal: &Terminal) -> Result<(), Failure> {
     if let Some(command) = &command {
         terminal.say(&format!("to import it: {command}"))?;
     }
-    let missing =
-        [(listing.wheels.is_none(), "wheels of a known type"), (listing.truth.is_none() && listing.scan.is_none(), "poses of an instrument")];
+    let missing = [
+        (listing.wheels.is_none(), "wheels of a known type"),
+        (listing.truth.is_none() && listing.scan.is_none(), "poses of an instrument"),
+    ];
     for (_, what) in missing.iter().filter(|(is_missing, _)| *is_missing) {
         terminal.say(&format!("no topic is plainly one of {what}; --help says how to name any other"))?;
     }

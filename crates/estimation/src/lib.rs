@@ -76,8 +76,8 @@ pub use normal_equations::{
 };
 pub use one_step::{LargeFit, OneStep, OneStepError, fit_large, is_large};
 pub use optimizer::{ConvergenceCriterion, FitOptions, Solution, fit, pass_with_innovations};
-pub use pass::Pass;
 pub use partial_outliers::PartialOutliers;
+pub use pass::Pass;
 pub use pass_options::OutlierGate;
 pub use path_shape::PathShape;
 pub use records::Records;

@@ -19,9 +19,9 @@ use crate::model::{Column, Model};
 use crate::noise::{NOISES, Noise, NoiseComponent};
 use crate::noise_score::NoiseScore;
 use crate::normal_equations::NormalEquations;
-use crate::partial_poses::{PoseUpdate, TakenPoses, Taking};
 use crate::partial_noise::{MOTION_NOISES, NoiseDerivatives};
 use crate::partial_observation::{Observation, Place, Quantity};
+use crate::partial_poses::{PoseUpdate, TakenPoses, Taking};
 use crate::partial_records::PartialSegment;
 use crate::pass_options::OutlierGate;
 use crate::products::{Products, Sums};
@@ -47,12 +47,7 @@ const fn wall_at(wall: usize) -> usize {
     bias_at() + 1 + 2 * wall
 }
 
-/// Where the lidar stands, after all walls; `None` where readings are of the drive's centre.
-fn lidar_at(walls: &WallStart) -> Option<usize> {
-    walls.lidar.map(|_| wall_at(walls.walls.len()))
-}
-
-/// Where the first copy stands.
+/// Where the first copy stands, behind the walls and the lidar that sees them.
 fn first_slot(walls: &WallStart) -> usize {
     wall_at(walls.walls.len()) + if walls.lidar.is_some() { 3 } else { 0 }
 }
@@ -191,7 +186,8 @@ impl<'f> PartialFilter<'f> {
             covariance[(at, at)] = WALL_DIRECTION_SIGMA_RAD.powi(2);
             covariance[(at + 1, at + 1)] = WALL_OFFSET_SIGMA_M.powi(2);
         }
-        if let Some((at, lidar)) = lidar_at(&segment.walls).zip(segment.walls.lidar) {
+        if let Some(lidar) = segment.walls.lidar {
+            let at = wall_at(segment.walls.walls.len());
             (state[at], state[at + 1], state[at + 2]) = (lidar.lever_m[0], lidar.lever_m[1], lidar.yaw_rad);
             let sigmas = [LIDAR_PLACE_SIGMA_M, LIDAR_PLACE_SIGMA_M, WALL_DIRECTION_SIGMA_RAD];
             (0..3).for_each(|row| covariance[(at + row, at + row)] = sigmas[row].powi(2));
@@ -234,8 +230,8 @@ impl<'f> PartialFilter<'f> {
 
     fn seen_by_lidar(&self, wall: usize) -> Option<SeenByLidar> {
         let WallStart { walls, lidar } = &self.segment.walls;
-        let (at, start) = (lidar_at(&self.segment.walls)?, (*lidar)?);
-        Some(SeenByLidar { at, start, direction_rad: self.origin_rad + walls[wall].direction_rad })
+        let at = wall_at(walls.len());
+        Some(SeenByLidar { at, start: (*lidar)?, direction_rad: self.origin_rad + walls[wall].direction_rad })
     }
 
     fn slot_at(&self, slot: usize) -> usize {

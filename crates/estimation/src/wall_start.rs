@@ -201,9 +201,14 @@ fn fitted_lidar(yaw_rad: f64, walls: &[Wall], seen: &[SeenDistance]) -> (WallSta
     };
     for _ in 0..WALL_START_STEPS {
         // What the readings do not determine hardly moves.
-        let mut information = DMatrix::from_fn(yaw + 1, yaw + 1, |row, column| {
-            if row == column { prior_sigma(row).powi(-2) } else { 0.0 }
-        });
+        let mut information =
+            DMatrix::from_fn(
+                yaw + 1,
+                yaw + 1,
+                |row, column| {
+                    if row == column { prior_sigma(row).powi(-2) } else { 0.0 }
+                },
+            );
         let mut gradient = DVector::zeros(yaw + 1);
         for of in seen {
             let off_m = residual_m(&values, of, &mut by);

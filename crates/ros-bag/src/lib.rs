@@ -36,9 +36,9 @@ mod settings;
 #[cfg(feature = "db3")]
 mod sqlite_file;
 mod static_frames;
+mod took;
 mod topics;
 mod truth;
-mod took;
 mod value;
 mod wall_line;
 mod wall_tracks;

@@ -57,11 +57,8 @@ pub(crate) fn add_walls(
     frames: &StaticFrames,
     warnings: &mut Vec<String>,
 ) -> Result<TakenScans, RosBagError> {
-    let unusable = |why: String| RosBagError::Unusable {
-        topic: topic.name.clone(),
-        type_name: topic.type_name.clone(),
-        why,
-    };
+    let unusable =
+        |why: String| RosBagError::Unusable { topic: topic.name.clone(), type_name: topic.type_name.clone(), why };
     let session = dataset.session();
     let paths: Vec<NominalPath> = session.runs.iter().map(|run| NominalPath::of(run, session.robot)).collect();
     let mut seen: Vec<Vec<SeenScan>> = spans.iter().map(|_| Vec::new()).collect();
@@ -147,7 +144,8 @@ pub(crate) fn add_walls(
         "scans have no time_increment: their beams count as measured at the stamp, which is wrong by the turn during a scan unless the driver corrects it",
     );
     if readings == 0 {
-        let why = format!("no straight wall of a metre is followed over its {count} scans; spin 1 to 4 m in front of one");
+        let why =
+            format!("no straight wall of a metre is followed over its {count} scans; spin 1 to 4 m in front of one");
         return Err(unusable(why));
     }
     dataset.truth_noise.lidar =
@@ -200,12 +198,7 @@ fn deskewed(scan: &Scan, t_s: f64, path: &NominalPath, mounted: Option<&Mounted>
 }
 
 /// A wall at the mean time of its beams, seconds from the run's start, as the lidar sees it then.
-fn at_mean_time(
-    wall: &WallLine,
-    t_s: f64,
-    path: &NominalPath,
-    mounted: Option<&Mounted>,
-) -> Option<(f64, WallLine)> {
+fn at_mean_time(wall: &WallLine, t_s: f64, path: &NominalPath, mounted: Option<&Mounted>) -> Option<(f64, WallLine)> {
     let lidar = moved(t_s, wall.after_s, path, mounted)?;
     // The wall's normal in the lidar's frame is (sin u, cos u).
     let (sin, cos) = wall.heading_rad.sin_cos();

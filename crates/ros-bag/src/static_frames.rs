@@ -117,7 +117,9 @@ fn plane(body_from_lidar: &Rigid) -> Result<Mounted, String> {
     let up = rotation[2][2];
     if up.abs() < MIN_UPRIGHT {
         let tilt_deg = up.clamp(-1.0, 1.0).acos().to_degrees();
-        return Err(format!("its axis is tilted by {tilt_deg:.0}°: it does not see the plane that the robot drives in"));
+        return Err(format!(
+            "its axis is tilted by {tilt_deg:.0}°: it does not see the plane that the robot drives in"
+        ));
     }
     let yaw_rad = rotation[1][0].atan2(rotation[0][0]);
     Ok(Mounted { body_from_lidar: Pose::new(translation[0], translation[1], yaw_rad), is_upside_down: up < 0.0 })

@@ -105,7 +105,8 @@ fn most_supported(points: &[ScanPoint]) -> Option<Line> {
         let share = (0.5 + f64::from(number) * step).fract();
         points.get((share * points.len() as f64) as usize).copied()
     };
-    let line = |number: u32| Line::through(index(number, 0.754_877_666_246_693)?, index(number, 0.569_840_290_998_053)?);
+    let line =
+        |number: u32| Line::through(index(number, 0.754_877_666_246_693)?, index(number, 0.569_840_290_998_053)?);
     let support = |line: &Line| points.iter().filter(|point| line.across_m(point).abs() <= WALL_TOLERANCE_M).count();
     let lines = (1..=WALL_PAIRS).filter_map(line).map(|line| (support(&line), line));
     // Of lines with the same support the first.
@@ -189,7 +190,11 @@ mod tests {
                 range_m if (2.0..5.0).contains(&range_m) => range_m + sigma_m * error(seed),
                 _ => 3.0 + 0.7 * error(seed),
             };
-            ScanPoint { x_m: range_m * angle_rad.cos(), y_m: range_m * angle_rad.sin(), after_s: 1e-3 * f64::from(number) }
+            ScanPoint {
+                x_m: range_m * angle_rad.cos(),
+                y_m: range_m * angle_rad.sin(),
+                after_s: 1e-3 * f64::from(number),
+            }
         };
         (0..360).map(beam).collect()
     }

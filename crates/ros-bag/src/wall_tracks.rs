@@ -76,7 +76,8 @@ pub(crate) fn follow(
     found.walls = kept.len();
     kept.sort_by(|a, b| a.readings[0].t_s.total_cmp(&b.readings[0].t_s));
     for (number, track) in kept.into_iter().enumerate() {
-        let named = track.readings.into_iter().map(|reading| WallReading { wall: format!("wall-{}", number + 1), ..reading });
+        let named =
+            track.readings.into_iter().map(|reading| WallReading { wall: format!("wall-{}", number + 1), ..reading });
         found.readings.extend(named);
     }
     found.readings.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));

@@ -4,8 +4,8 @@ use dataset::{Dataset, LidarExtrinsics, Run, WallReading};
 use kinematics::Pose;
 
 use super::partial::{
-    M_PER_RAD, NO_GYRO, NOISELESS, SEPARATION_M, SIGMA_M, SIGMA_RAD, dataset, equations, errors, fitted, noise, nominal,
-    tape, wall,
+    M_PER_RAD, NO_GYRO, NOISELESS, SEPARATION_M, SIGMA_M, SIGMA_RAD, dataset, equations, errors, fitted, noise,
+    nominal, tape, wall,
 };
 use crate::{Column, PartialOutliers};
 
