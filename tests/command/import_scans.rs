@@ -240,7 +240,12 @@ fn spins_in_front_of_a_wall_calibrate_the_wheelbase_and_no_wheel() {
         for wheel in ["left_wheel_diameter_m", "right_wheel_diameter_m"] {
             assert!(method["parameters"][wheel]["value"].is_null(), "{found}");
         }
-        assert!(method["not_observable"].to_string().contains("nothing measures a length"), "{found}");
+        let why = method["not_observable"].to_string();
+        assert!(why.contains("nothing measures a length: the wheelbase holds for wheels as stated"), "{found}");
+        let checked = document(at, &["check", name]);
+        let determined = ["left_wheel_diameter_m", "right_wheel_diameter_m", "wheel_separation_m"]
+            .map(|key| checked["determined"][key].as_bool().expect("a truth value"));
+        assert_eq!(determined, [false, false, true], "{checked}");
     }
 }
 

@@ -54,6 +54,7 @@ mod resimulation;
 mod rounding;
 mod segment;
 mod settings;
+mod stated_wheels;
 #[cfg(test)]
 mod tests;
 mod thinning;

@@ -22,6 +22,7 @@ use crate::settings::{
     MIN_OWN_DIRECTION, MIN_RUNS_TO_HOLD_OUT, MIN_SPARE_CLUSTERS, ROTATED_SENSOR_RAD, SPACING_SLACK, THINNING_FACTOR,
     THINNING_PHASES, WHITENESS_Z,
 };
+use crate::stated_wheels::with_stated_wheels;
 use crate::thinning::{Selection, Thinning};
 
 /// A maximum-likelihood fit with the records and measurements that it rests on.
@@ -249,7 +250,7 @@ impl ModelFit<'_> {
     pub(crate) fn fix_unobservable(&mut self) -> Result<(), EstimationError> {
         let Some(information) = self.solution.information(&self.columns) else { return Ok(()) };
         let was_fixed = !self.unobservable.is_empty();
-        self.unobservable = unobservable(&information.matrix);
+        self.unobservable = with_stated_wheels(unobservable(&information.matrix), self.records.is_partial());
         if self.unobservable.is_empty() {
             // A direction that has become observable is free again.
             return if was_fixed { self.refit(Some(self.current_values()), &mut []) } else { Ok(()) };
