@@ -120,7 +120,7 @@ impl Bag {
 }
 
 /// Heading and heading on the wheels at every millisecond: spins of two turns both ways at several speeds,
-/// with standstills of 4 s between them. At a yaw rate ω the contacts are farther apart by `by_rate` ω².
+/// with standstills of 4 s between them. At a yaw rate ω the contacts are farther apart by `by_rate` |ω|.
 fn spins(by_rate: f64) -> Vec<[f64; 2]> {
     let mut path = vec![[0.0; 2]; 4000];
     for rate in [0.4, -0.4, 0.8, -0.8, 1.2, -1.2, 1.6, -1.6_f64] {
@@ -130,7 +130,7 @@ fn spins(by_rate: f64) -> Vec<[f64; 2]> {
             let t_s = 1e-3 * f64::from(step);
             let yaw_rate = rate * (t_s.min(duration_s + 0.5 - t_s) / 0.5).clamp(0.0, 1.0);
             let [heading_rad, wheels_rad] = path[path.len() - 1];
-            let wider = 1.0 + by_rate * yaw_rate * yaw_rate;
+            let wider = 1.0 + by_rate * yaw_rate.abs();
             path.push([heading_rad + 1e-3 * yaw_rate, wheels_rad + 1e-3 * yaw_rate * wider]);
         }
         path.extend(vec![path[path.len() - 1]; 4000]);
@@ -151,7 +151,11 @@ fn write_bag(path: &Path, seed: u64, by_rate: f64, has_frames: bool) {
     let path = spins(by_rate);
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let end_s = 1e-3 * (path.len() - 1) as f64;
-    let at = |t_s: f64| path[((1e3 * t_s) as usize).min(path.len() - 1)];
+    let at = |t_s: f64| {
+        let whole = ((1e3 * t_s) as usize).min(path.len() - 2);
+        let share = 1e3 * t_s - whole as f64;
+        [0, 1].map(|k| path[whole][k] + share * (path[whole + 1][k] - path[whole][k]))
+    };
     for row in 0..(end_s / ROW_S) as u32 {
         let t_s = ROW_S * f64::from(row);
         let angle = at(t_s)[1] * BASE_M / WHEEL_M;
@@ -266,4 +270,17 @@ fn a_bag_of_a_lidar_says_what_to_type_and_what_is_missing() {
     assert!(message.contains("no type of poses"), "{message}");
     let ended = run_in(at, &["check", "a"]);
     assert_eq!(ended.code, Some(0), "{} {}", ended.stdout, ended.stderr);
+}
+
+#[test]
+fn a_wheelbase_that_grows_with_the_yaw_rate_is_found_by_a_wall() {
+    let temp = tempfile::tempdir().expect("a folder");
+    let at = temp.path();
+    // 1 % at 1 rad/s; rules of thumb say 0.1 to 3 %.
+    write_bag(&at.join("spins.mcap"), 9, 0.01, true);
+    imported(at, "spins");
+    let found = document(at, &["diagnose", "spins"]);
+    let names: Vec<&str> =
+        found["findings"].as_array().expect("findings").iter().filter_map(|of| of["id"].as_str()).collect();
+    assert!(names.contains(&"turn_rate_wheelbase"), "{found}");
 }

@@ -2,9 +2,9 @@
 //!
 //! Its state is the pose that the counts say, copies of it at the places that measurements are of (Mourikis &
 //! Roumeliotis 2007 call it cloning), the gyroscope's bias, each wall's direction and place, and the place of
-//! the lidar that sees them. A copy holds the rounding of the counts at its place. Every measurement is a scalar function of copies, bias and walls:
-//! with its derivative g the update is that of [`crate::filter`], P and its derivatives by ln(variance)
-//! included.
+//! the lidar that sees them. A copy holds the rounding of the counts at its place. Every measurement is a
+//! scalar function of copies, bias, walls and lidar: with its derivative g the update is that of
+//! [`crate::filter`], P and its derivatives by ln(variance) included.
 //!
 //! Beside poses the filter starts in their room with hardly any knowledge of where, and takes them as whole
 //! measurements. What the partial measurements say given the poses is then its sums with both less its sums
@@ -16,10 +16,10 @@ use model_term::ModelTerm;
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::model::{Column, Model};
-use crate::noise::{NOISES, Noise, NoiseComponent};
+use crate::noise::{NOISES, Noise};
 use crate::noise_score::NoiseScore;
 use crate::normal_equations::NormalEquations;
-use crate::partial_noise::{MOTION_NOISES, NoiseDerivatives};
+use crate::partial_noise::{NoiseDerivatives, OF_MOTION};
 use crate::partial_observation::{Observation, Place, Quantity};
 use crate::partial_poses::{PoseUpdate, TakenPoses, Taking};
 use crate::partial_records::PartialSegment;
@@ -33,9 +33,6 @@ use crate::settings::{
 };
 use crate::thinning::PropagationInterval;
 use crate::wall_start::{SeenByLidar, WallDistance, WallStart};
-
-/// Variances that the wheels' motion depends on.
-const OF_MOTION: [NoiseComponent; MOTION_NOISES] = [NoiseComponent::Wheel, NoiseComponent::Turn];
 
 /// Where the bias stands in the state, after the pose.
 const fn bias_at() -> usize {

@@ -3,12 +3,12 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, MatrixXx3, Vector3};
 
-use crate::noise::NOISES;
+use crate::noise::{NOISES, NoiseComponent};
 use crate::noise_score::NoiseScore;
 use crate::partial_poses::PoseUpdate;
 
-/// Number of variances that the wheels' motion depends on; they come first.
-pub(crate) const MOTION_NOISES: usize = 2;
+/// Variances that the wheels' motion depends on; they come first.
+pub(crate) const OF_MOTION: [NoiseComponent; 2] = [NoiseComponent::Wheel, NoiseComponent::Turn];
 
 /// Derivatives of covariance and state by the logarithms of the variances: those of the motion, and beside
 /// poses those of the instrument.
@@ -35,7 +35,7 @@ impl NoiseDerivatives {
         for a in 0..self.covariance_by.len() {
             let ph_by = &self.covariance_by[a] * h;
             s_by[a] = h.tr_mul(&ph_by);
-            if let Some(own) = a.checked_sub(MOTION_NOISES) {
+            if let Some(own) = a.checked_sub(OF_MOTION.len()) {
                 s_by[a] += of.errors_by[own];
             }
             v_by[a] = -h.tr_mul(&self.state_by[a]);

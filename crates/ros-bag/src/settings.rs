@@ -119,7 +119,7 @@ pub(crate) const WALL_HEADING_TOLERANCE_RAD: f64 = 0.05;
 /// Budgeted: twice the error of a nominal wheelbase that nobody measured.
 pub(crate) const WALL_TURN_SHARE: f64 = 0.1;
 
-/// Radians. The same at the most: a wall that was out of sight for longer counts as another one.
+/// Radians. The same at the most: a wall that was hidden for longer counts as another one.
 /// Budgeted: walls of a room are 90° apart; a third of that.
 pub(crate) const MAX_WALL_HEADING_TOLERANCE_RAD: f64 = 0.5;
 

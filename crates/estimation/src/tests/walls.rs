@@ -101,7 +101,7 @@ fn a_reading_ten_standard_deviations_off_is_rejected_and_moves_nothing() {
 
 #[test]
 fn a_robot_that_is_displaced_goes_on_from_its_new_place() {
-    let displaced = dataset(NO_GYRO, |run, poses| {
+    let moved_by_hand = dataset(NO_GYRO, |run, poses| {
         // A turn by hand of 0.3 rad in the middle of a straight: two readings in a row are off.
         let turned: Vec<Pose> = poses.iter().map(|pose| Pose::new(pose.x_m, pose.y_m, pose.theta_rad + 0.3)).collect();
         for row in (0..=280).step_by(10) {
@@ -109,7 +109,7 @@ fn a_robot_that_is_displaced_goes_on_from_its_new_place() {
         }
         tape(run, poses, [20, 70], 0.0);
     });
-    let fit = fitted(&displaced);
+    let fit = fitted(&moved_by_hand);
     let rejected: Vec<_> = fit.partial_outliers().into_iter().map(|of| of.rejected).collect();
     // The first reading behind the turn; the second starts anew.
     assert_eq!(rejected, vec![vec![("headings along walls", 1)]; 4]);
