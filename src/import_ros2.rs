@@ -15,10 +15,10 @@ use crate::terminal::{Failure, Terminal, table};
 /// A bag of ROS 2: a folder of rosbag2 or one .mcap file, plain or compressed
 ///
 /// Two topics become a dataset: the robot's wheels and the poses of an outside instrument; with an Imu, its
-/// yaw rates too. Without such poses the scans of a lidar tell: the straight walls that it sees, spin in front
-/// of one. --list shows what a bag holds and what to type. Known types of wheels: JointState and DynamicJointState (joints by name),
-/// SensorState of turtlebot3 and kobuki, WheelTicks and WheelVels of the Create 3, and the twists of Odometry
-/// and TwistStamped; any other by --left-field, --right-field and --as. Of poses: PoseStamped,
+/// yaw rates too. Without such poses the straight walls that a lidar sees take their place: spin in front of
+/// one. --list shows what a bag holds and what to type. Known types of wheels: JointState and
+/// DynamicJointState (joints by name), SensorState of turtlebot3 and kobuki, WheelTicks and WheelVels of the
+/// Create 3, and the twists of Odometry and TwistStamped; any other by --left-field, --right-field and --as. Of poses: PoseStamped,
 /// PoseWithCovarianceStamped, TransformStamped, Odometry of an instrument, and TFMessage with
 /// --truth-frames.
 #[derive(Args)]
@@ -42,7 +42,7 @@ pub(crate) struct Arguments {
     /// Topic of the poses of an outside instrument.
     #[arg(long, value_name = "TOPIC", help_heading = "Topics")]
     truth: Option<String>,
-    /// Topic of a lidar's scans (LaserScan), in place of poses or beside them: the straight walls in it become
+    /// Topic of a lidar's scans (LaserScan), in place of poses or beside them: its straight walls become
     /// wall.csv. Taken by itself where it is the only one and the bag has no poses of an instrument. Where
     /// the lidar stands is estimated, from where /tf_static has it.
     #[arg(long, value_name = "TOPIC", help_heading = "Topics")]

@@ -2,6 +2,7 @@
 
 use crate::model_fit::ModelFit;
 use crate::partial_observation::Quantity;
+use crate::partial_records::PartialSegment;
 
 /// The partial measurements that were rejected in a run: scalars, of which a reading of a wall has two.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -37,7 +38,7 @@ impl ModelFit<'_> {
             let (run, kind) = (partial.segment.run, kind(of.quantity));
             if found.last().is_none_or(|last| last.run != run) {
                 let of_run = self.records.partial.iter().filter(|partial| partial.segment.run == run);
-                let of = of_run.map(|partial| partial.partial_measurements()).sum();
+                let of = of_run.map(PartialSegment::partial_measurements).sum();
                 found.push(PartialOutliers { run, rejected: Vec::new(), of });
             }
             let Some(last) = found.last_mut() else { continue };

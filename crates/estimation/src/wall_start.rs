@@ -17,7 +17,8 @@ use crate::settings::{
     LIDAR_PLACE_SIGMA_M, WALL_DIRECTION_SIGMA_RAD, WALL_OFFSET_SIGMA_M, WALL_START_DIRECTIONS, WALL_START_STEPS,
 };
 
-/// A wall by its direction, less the lidar's yaw where there is one, and its distance from the segment's start.
+/// A wall by its direction, less the lidar's yaw where there is one, and its distance from the segment's
+/// start.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Wall {
     pub(crate) direction_rad: f64,

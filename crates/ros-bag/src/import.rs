@@ -46,8 +46,8 @@ pub struct Options {
     pub wheels: Option<String>,
     /// Topic of the poses of an outside instrument.
     pub truth: Option<String>,
-    /// Topic of the scans of a lidar in which walls are sought; where none is said, the only one of a bag that
-    /// has no poses.
+    /// Topic of the scans of a lidar in which walls are sought; where none is said, the only one of a bag
+    /// that has no poses.
     pub scan: Option<String>,
     /// Topic of a gyroscope's rates; where none is said, the only one of the bag.
     pub gyro: Option<String>,

@@ -107,8 +107,8 @@ pub(crate) const MAX_WALLS_PER_SCAN: usize = 3;
 pub(crate) const MIN_WALL_SIGMA_M: f64 = 1e-3;
 
 /// Radians. Least standard deviation of a heading.
-/// Derived: beams turn by ω t in the scan; a wheelbase that is 5 % wrong leaves 5 % of it, over the quarter of
-/// a scan that a wall takes, at 1 rad/s and 10 Hz 1 mrad from end to end, of which the slope has half.
+/// Derived: beams turn by ω t in the scan; a wheelbase that is 5 % wrong leaves 5 % of it, over the quarter
+/// of a scan that a wall takes, at 1 rad/s and 10 Hz 1 mrad from end to end, of which the slope has half.
 pub(crate) const MIN_WALL_SIGMA_RAD: f64 = 5e-4;
 
 /// Radians. By how much a wall's heading may be off from what the wheels predict from the last scan of it.

@@ -3,8 +3,8 @@
 //! The line with the most points within a tolerance is sought among lines through pairs of points (Fischler &
 //! Bolles 1981), whose indices follow a sequence of low discrepancy: the same scan gives the same lines. Its
 //! points without a gap between them are fitted by total least squares (Arras & Siegwart 1997, eqs. 4 and 5):
-//! the direction is that of the larger principal axis of their scatter, through their mean. With sᵢ along the
-//! line from the mean, eᵢ across it and S = Σ sᵢ², the direction is off by Σ sᵢ eᵢ / S and the distance at the
+//! the direction is that of the larger principal axis of their scatter, through their mean. With sᵢ along
+//! the line from the mean, eᵢ across it and S = Σ sᵢ², the direction is off by Σ sᵢ eᵢ / S and the distance at the
 //! foot of the perpendicular, s̄ from the mean, by Σ (1/N + s̄ sᵢ / S) eᵢ. The variances are the sums of the
 //! squares of these terms times N / (N − 2) (White 1980; MacKinnon & White 1985, HC1): the noise of ranges
 //! need not be known, nor the same at all incidences.
@@ -204,15 +204,16 @@ mod tests {
         let (mut of_heading, mut of_distance, mut count) = (0.0, 0.0, 0.0);
         for number in 0..200 {
             let heading_rad = 0.031 * f64::from(number) - 3.1;
-            let found = walls(&scan(heading_rad, 0.01, 1000.0 * f64::from(number)));
+            let found = walls(&scan(heading_rad, 0.02, 1000.0 * f64::from(number)));
             let wall = found.first().expect("a wall");
             let z_rad = kinematics::wrap_to_pi(wall.heading_rad - heading_rad) / wall.sigma_rad;
             let z_m = (wall.distance_m - 2.0) / wall.sigma_m;
-            // Clutter that happens to lie on the wall's line is a part of it.
+            // At 2 cm both standard deviations are above their least values. Clutter that happens to lie on
+            // the wall's line is a part of it.
             assert!(z_rad.abs() < 6.0 && z_m.abs() < 6.0, "{heading_rad}: {wall:?}");
             (of_heading, of_distance, count) = (of_heading + z_rad * z_rad, of_distance + z_m * z_m, count + 1.0);
         }
-        // The mean of 200 squares is 1 ± 0.1; clutter near the line and the trimming at 3 σ move it by as much.
+        // The mean of 200 squares is 1 ± 0.1; clutter near the line and trimming move it by more.
         // Rejects a variance that is three times too small or too large.
         for mean_square in [of_heading / count, of_distance / count] {
             assert!((0.6..1.7).contains(&mean_square), "{of_heading} {of_distance} of {count}");

@@ -340,7 +340,7 @@ mod tests {
         let found = with("covariance_scale = \"separate\"").expect("readable").dataset.truth_noise;
         assert_eq!(found.covariance_scale, CovarianceScale::Separate);
         let refused = with("covariance_scale = \"both\"").expect_err("no scale").to_string();
-        assert!(refused.contains(&format!("line {}", line + 1)), "{refused}");
+        assert!(refused.contains(&format!("dataset.toml:{}:", line + 1)), "{refused}");
         assert!(refused.contains("separate") && refused.contains("common"), "{refused}");
         let mut wrong = dataset("one");
         wrong.truth_noise.lidar = Some(LidarExtrinsics { yaw_rad: Some(f64::NAN) });
