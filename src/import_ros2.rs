@@ -18,9 +18,9 @@ use crate::terminal::{Failure, Terminal, table};
 /// yaw rates too. Without such poses the straight walls that a lidar sees take their place: spin in front of
 /// one. --list shows what a bag holds and what to type. Known types of wheels: JointState and
 /// DynamicJointState (joints by name), SensorState of turtlebot3 and kobuki, WheelTicks and WheelVels of the
-/// Create 3, and the twists of Odometry and TwistStamped; any other by --left-field, --right-field and --as. Of poses: PoseStamped,
-/// PoseWithCovarianceStamped, TransformStamped, Odometry of an instrument, and TFMessage with
-/// --truth-frames.
+/// Create 3, and the twists of Odometry and TwistStamped; any other by --left-field, --right-field and --as.
+/// Of poses: PoseStamped, PoseWithCovarianceStamped, TransformStamped, Odometry of an instrument, and
+/// TFMessage with --truth-frames.
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// Folder with metadata.yaml, or one .mcap or .mcap.zstd file.
