@@ -1,13 +1,13 @@
 //! Straight walls in the points of a scan.
 //!
-//! The line with the most points within a tolerance is sought among lines through pairs of points (Fischler &
-//! Bolles 1981), whose indices follow a sequence of low discrepancy: the same scan gives the same lines. Its
-//! points without a gap between them are fitted by total least squares (Arras & Siegwart 1997, eqs. 4 and 5):
-//! the direction is that of the larger principal axis of their scatter, through their mean. With sᵢ along
-//! the line from the mean, eᵢ across it and S = Σ sᵢ², the direction is off by Σ sᵢ eᵢ / S and the distance
-//! at the foot of the perpendicular, s̄ from the mean, by Σ (1/N + s̄ sᵢ / S) eᵢ. The variances are the sums of the
-//! squares of these terms times N / (N − 2) (White 1980; MacKinnon & White 1985, HC1): the noise of ranges
-//! need not be known, nor the same at all incidences.
+//! The line with the most points within a tolerance is sought among lines through pairs of points (Fischler
+//! & Bolles 1981), whose indices follow a sequence of low discrepancy: the same scan gives the same lines.
+//! Its points without a gap between them are fitted by total least squares (Arras & Siegwart 1997, eqs. 4
+//! and 5): the direction is that of the larger principal axis of their scatter, through their mean. With sᵢ
+//! along the line from the mean, eᵢ across it and S = Σ sᵢ², the direction is off by Σ sᵢ eᵢ / S and the
+//! distance at the foot of the perpendicular, s̄ from the mean, by Σ (1/N + s̄ sᵢ / S) eᵢ. The variances
+//! are the sums of the squares of these terms times N / (N − 2) (White 1980; MacKinnon & White 1985, HC1):
+//! the noise of ranges need not be known, nor the same at all incidences.
 
 use crate::settings::{
     MAX_WALL_GAP_M, MAX_WALLS_PER_SCAN, MIN_PAIR_M, MIN_WALL_BEAMS, MIN_WALL_LENGTH_M, MIN_WALL_SHARE,
