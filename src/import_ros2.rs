@@ -15,12 +15,12 @@ use crate::terminal::{Failure, Terminal, table};
 /// A bag of ROS 2: a folder of rosbag2 or one .mcap file, plain or compressed
 ///
 /// Two topics become a dataset: the robot's wheels and the poses of an outside instrument; with an Imu, its
-/// yaw rates too. --list shows what
-/// a bag holds and what to type. Known types of wheels: JointState and DynamicJointState (joints by name),
-/// SensorState of turtlebot3 and kobuki, WheelTicks and WheelVels of the Create 3, and the twists of Odometry
-/// and TwistStamped; any other by --left-field, --right-field and --as. Of poses: PoseStamped,
-/// PoseWithCovarianceStamped, TransformStamped, Odometry of an instrument, and TFMessage with
-/// --truth-frames.
+/// yaw rates too. Without such poses the straight walls that a lidar sees take their place: spin in front of
+/// one. --list shows what a bag holds and what to type. Known types of wheels: JointState and
+/// DynamicJointState (joints by name), SensorState of turtlebot3 and kobuki, WheelTicks and WheelVels of the
+/// Create 3, and the twists of Odometry and TwistStamped; any other by --left-field, --right-field and --as.
+/// Of poses: PoseStamped, PoseWithCovarianceStamped, TransformStamped, Odometry of an instrument, and
+/// TFMessage with --truth-frames.
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// Folder with metadata.yaml, or one .mcap or .mcap.zstd file.
@@ -42,6 +42,11 @@ pub(crate) struct Arguments {
     /// Topic of the poses of an outside instrument.
     #[arg(long, value_name = "TOPIC", help_heading = "Topics")]
     truth: Option<String>,
+    /// Topic of a lidar's scans (LaserScan), in place of poses or beside them: its straight walls become
+    /// wall.csv. Taken by itself where it is the only one and the bag has no poses of an instrument. Where
+    /// the lidar stands is estimated, from where /tf_static has it.
+    #[arg(long, value_name = "TOPIC", help_heading = "Topics")]
+    scan: Option<String>,
     /// Topic of a gyroscope (Imu), if the bag's only one is not meant: its rates about the z axis of its
     /// frame, which is taken as up, become the column gyro_radps, their mean over the interval that ends at a
     /// row.
@@ -111,6 +116,7 @@ struct Written {
     runs: usize,
     odometry_rows: usize,
     truth_rows: usize,
+    wall_rows: usize,
 }
 
 #[derive(Serialize)]
@@ -138,9 +144,14 @@ fn import(arguments: &Arguments, out: &Path, terminal: &Terminal) -> Result<(), 
     let FromBag { mut dataset, took, warnings } =
         ros_bag::import(&arguments.bag, &arguments.options()?).map_err(as_question)?;
     arguments.robot.identity.state_in(&mut dataset.provenance);
-    let gyro = took.gyro.iter().map(|gyro| ("gyro", "--gyro", gyro));
-    let both = [("wheels", "--wheels", &took.wheels), ("truth", "--truth", &took.truth)];
-    for (what, flag, topic) in both.into_iter().chain(gyro) {
+    let topics = [
+        ("wheels", "--wheels", Some(&took.wheels)),
+        ("truth", "--truth", took.truth.as_ref()),
+        ("scan", "--scan", took.scan.as_ref()),
+        ("gyro", "--gyro", took.gyro.as_ref()),
+    ];
+    for (what, flag, topic) in topics {
+        let Some(topic) = topic else { continue };
         let TookTopic { topic, type_name, what: of, quantity, rows, times } = topic;
         terminal.say(&format!("{what}: {topic} ({type_name}), {of}, {quantity}, {rows} rows by {times} ({flag})"))?;
     }
@@ -153,9 +164,11 @@ fn import(arguments: &Arguments, out: &Path, terminal: &Terminal) -> Result<(), 
         runs: dataset.runs.len(),
         odometry_rows: dataset.runs.iter().map(|run| run.odometry.t_s.len()).sum(),
         truth_rows: dataset.runs.iter().map(|run| run.truth.len()).sum(),
+        wall_rows: dataset.runs.iter().map(|run| run.walls.len()).sum(),
     };
-    let Written { dataset: out, runs, odometry_rows, truth_rows } = &written;
-    terminal.say(&format!("{runs} runs, {odometry_rows} odometry rows, {truth_rows} truth rows in {out}"))?;
+    let Written { dataset: out, runs, odometry_rows, truth_rows, wall_rows } = &written;
+    let walls = if took.scan.is_some() { format!(", {wall_rows} readings of walls") } else { String::new() };
+    terminal.say(&format!("{runs} runs, {odometry_rows} odometry rows, {truth_rows} truth rows{walls} in {out}"))?;
     terminal.document(&Document {
         format: "ros2",
         source: arguments.bag.display().to_string(),
@@ -170,6 +183,7 @@ impl Arguments {
         Ok(Options {
             wheels: self.wheels.clone(),
             truth: self.truth.clone(),
+            scan: self.scan.clone(),
             gyro: self.gyro.clone(),
             definitions: self.definitions.clone(),
             fields: WheelFields {
@@ -219,8 +233,10 @@ fn list(arguments: &Arguments, terminal: &Terminal) -> Result<(), Failure> {
     if let Some(command) = &command {
         terminal.say(&format!("to import it: {command}"))?;
     }
-    let missing =
-        [(listing.wheels.is_none(), "wheels of a known type"), (listing.truth.is_none(), "poses of an instrument")];
+    let missing = [
+        (listing.wheels.is_none(), "wheels of a known type"),
+        (listing.truth.is_none() && listing.scan.is_none(), "poses of an instrument"),
+    ];
     for (_, what) in missing.iter().filter(|(is_missing, _)| *is_missing) {
         terminal.say(&format!("no topic is plainly one of {what}; --help says how to name any other"))?;
     }
@@ -234,18 +250,21 @@ fn list(arguments: &Arguments, terminal: &Terminal) -> Result<(), Failure> {
 
 /// The command line that imports the most plausible topics.
 fn command(arguments: &Arguments, listing: &Listing) -> Option<String> {
-    if listing.wheels.is_none() && listing.truth.is_none() {
+    if listing.wheels.is_none() && listing.truth.is_none() && listing.scan.is_none() {
         return None;
     }
     let quoted = |name: &str| if name.contains(' ') { format!("'{name}'") } else { name.to_owned() };
     let topic = |topic: &Option<String>| topic.as_deref().map_or_else(|| "TOPIC".to_owned(), quoted);
     let flags: String = listing.flags.iter().map(|flag| format!(" {flag}")).collect();
     let gyro = listing.gyro.as_deref().map(|topic| format!(" --gyro {}", quoted(topic))).unwrap_or_default();
+    let reference = match (&listing.truth, &listing.scan) {
+        (None, Some(scan)) => format!("--scan {}", quoted(scan)),
+        (truth, _) => format!("--truth {}", topic(truth)),
+    };
     let ticks = if listing.is_counted { " --ticks-per-rev COUNTS" } else { "" };
     Some(format!(
-        "yair import ros2 {} --out DIR --wheels {} --truth {}{gyro}{flags} --wheel DIAMETER_M --base SEPARATION_M{ticks}",
+        "yair import ros2 {} --out DIR --wheels {} {reference}{gyro}{flags} --wheel DIAMETER_M --base SEPARATION_M{ticks}",
         quoted(&arguments.bag.display().to_string()),
         topic(&listing.wheels),
-        topic(&listing.truth),
     ))
 }

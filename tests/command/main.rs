@@ -17,6 +17,7 @@ mod fleet;
 mod good_log;
 mod import_csv;
 mod import_ros2;
+mod import_scans;
 mod import_tum;
 #[cfg(unix)]
 mod interrupt;

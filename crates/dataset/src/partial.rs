@@ -85,3 +85,11 @@ pub struct GyroNoise {
     /// A row has the rate at its instant instead of the mean over the interval that ends there.
     pub is_instantaneous: bool,
 }
+
+/// The sensor that readings of walls are of, where it does not stand in the drive's centre: `[lidar]` of
+/// `dataset.toml`. Its place on the robot is found for each run.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct LidarExtrinsics {
+    /// Its heading on the robot, radians, near which the fit starts; `None` is unknown.
+    pub yaw_rad: Option<f64>,
+}

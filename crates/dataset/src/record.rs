@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use crate::interval_means::interval_means;
 use crate::map_distortion::MapDistortion;
-use crate::partial::{GyroNoise, GyroSample, HeadingReading, Revisit, TapeDistance, WallReading};
+use crate::partial::{GyroNoise, GyroSample, HeadingReading, LidarExtrinsics, Revisit, TapeDistance, WallReading};
 use crate::pose_covariance::PoseCovariance;
 use jiff::Timestamp;
 use kinematics::{DriveGeometry, GeometryError, Point, Wheels};
@@ -104,6 +104,8 @@ pub struct TruthNoise {
     pub map: Option<MapDistortion>,
     /// The gyroscope.
     pub gyro: GyroNoise,
+    /// The sensor that sees the walls; `None`: their readings are of the drive's centre.
+    pub lidar: Option<LidarExtrinsics>,
 }
 
 /// What standard deviations and covariances that rows of the truth state are known up to; it is estimated.

@@ -37,6 +37,9 @@ mod nuisances;
 mod one_step;
 mod optimizer;
 mod partial_filter;
+mod partial_noise;
+mod partial_observation;
+mod partial_outliers;
 mod partial_poses;
 mod partial_records;
 mod pass;
@@ -51,11 +54,13 @@ mod resimulation;
 mod rounding;
 mod segment;
 mod settings;
+mod stated_wheels;
 #[cfg(test)]
 mod tests;
 mod thinned_fit;
 mod thinning;
 mod timing_noise;
+mod wall_start;
 mod wheel_angles;
 mod wheel_rates;
 
@@ -73,6 +78,7 @@ pub use normal_equations::{
 };
 pub use one_step::{LargeFit, OneStep, OneStepError, fit_large, is_large};
 pub use optimizer::{ConvergenceCriterion, FitOptions, Solution, fit, pass_with_innovations};
+pub use partial_outliers::PartialOutliers;
 pub use pass::Pass;
 pub use pass_options::OutlierGate;
 pub use path_shape::PathShape;

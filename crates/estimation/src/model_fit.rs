@@ -21,6 +21,7 @@ use crate::settings::{
     MAX_AUTOCORRELATION_LAG, MAX_OBSERVABLE_SIGMA, MIN_CLUSTERS, MIN_NAMED_DIRECTION, MIN_OWN_DIRECTION,
     MIN_RUNS_TO_HOLD_OUT, MIN_SPARE_CLUSTERS, ROTATED_SENSOR_RAD, WHITENESS_Z,
 };
+use crate::stated_wheels::with_stated_wheels;
 use crate::thinning::{Selection, Thinning};
 
 /// A maximum-likelihood fit with the records and measurements that it rests on.
@@ -95,7 +96,8 @@ impl ModelFit<'_> {
     /// The values found, with records that hold no measurements.
     pub(crate) fn with_records<'b>(self, records: Records<'b>) -> ModelFit<'b> {
         let Self { thinning, nominal, start, solution, columns, unobservable, prior, ends, parts, .. } = self;
-        let pass = Pass { innovations: Vec::new(), outliers: Vec::new(), ..solution.pass };
+        let pass =
+            Pass { innovations: Vec::new(), outliers: Vec::new(), partial_outliers: Vec::new(), ..solution.pass };
         let solution = Solution { pass, ..solution };
         let (displacements_in_series, ungated) = (self.displacements_in_series, self.ungated);
         ModelFit {
@@ -221,7 +223,7 @@ impl ModelFit<'_> {
     pub(crate) fn fix_unobservable(&mut self) -> Result<(), EstimationError> {
         let Some(information) = self.solution.information(&self.columns) else { return Ok(()) };
         let was_fixed = !self.unobservable.is_empty();
-        self.unobservable = unobservable(&information.matrix);
+        self.unobservable = with_stated_wheels(unobservable(&information.matrix), self.records.is_partial());
         if self.unobservable.is_empty() {
             // A direction that has become observable is free again.
             return if was_fixed { self.refit(Some(self.current_values()), &mut []) } else { Ok(()) };

@@ -146,23 +146,29 @@ pub(crate) fn fit_from(
     if from.noise.is_none() {
         // The noise is scaled to the median, which is robust to outliers, before these are rejected.
         for round in 1..=MAX_UNGATED_STEPS {
+            // Partial measurements give no innovations; their noise follows its likelihood.
+            let noise_score = records.is_partial() && !options.noise_fixed;
             let (gate, free) = (OutlierGate::Off, Some(&options.columns[..]));
-            let pass_options = PassOptions { innovations: true, gate, free, ..PassOptions::default() };
+            let pass_options = PassOptions { innovations: true, noise_score, gate, free, ..PassOptions::default() };
             let found = pass(records, selections, &model, &noise, &headings, terms, pass_options);
             let mean = MeanStep::of(&found, options, &basis)?;
             let (_, own) = take_step(&mut model, &mut headings, &found, options, mean.by)?;
             let moved = mean.squared + own;
             let mut squares: Vec<f64> =
                 found.innovations.iter().flatten().map(|innovation| innovation.z.powi(2)).collect();
-            if squares.is_empty() {
-                break;
-            }
             let middle = squares.len() / 2;
-            let (_, median, _) = squares.select_nth_unstable_by(middle, f64::total_cmp);
-            noise = noise.scaled(
-                (*median / CHI_SQUARE_1_MEDIAN).clamp(MAX_NOISE_SCALING.recip(), MAX_NOISE_SCALING),
-                MIN_NOISE_SIGMA * MIN_NOISE_SIGMA,
-            );
+            if noise_score {
+                let step = NoiseStep::of(&noise, &found, prior);
+                take_noise_step(&mut noise, step.by);
+            } else if squares.is_empty() {
+                break;
+            } else {
+                let (_, median, _) = squares.select_nth_unstable_by(middle, f64::total_cmp);
+                noise = noise.scaled(
+                    (*median / CHI_SQUARE_1_MEDIAN).clamp(MAX_NOISE_SCALING.recip(), MAX_NOISE_SCALING),
+                    MIN_NOISE_SIGMA * MIN_NOISE_SIGMA,
+                );
+            }
             // Where steps are large, a long path with few measurements makes all of them look like outliers.
             if round >= MIN_UNGATED_STEPS && moved < GATING_STEP {
                 break;

@@ -1,10 +1,10 @@
 //! The filter of a run's partial measurements.
 //!
 //! Its state is the pose that the counts say, copies of it at the places that measurements are of (Mourikis &
-//! Roumeliotis 2007 call it cloning), the gyroscope's bias, and each wall's direction and place. A copy holds
-//! the rounding of the counts at its place. Every measurement is a scalar function of copies, bias and walls:
-//! with its derivative g the update is that of [`crate::filter`], P and its derivatives by ln(variance)
-//! included.
+//! Roumeliotis 2007 call it cloning), the gyroscope's bias, each wall's direction and place, and the place of
+//! the lidar that sees them. A copy holds the rounding of the counts at its place. Every measurement is a
+//! scalar function of copies, bias, walls and lidar: with its derivative g the update is that of
+//! [`crate::filter`], P and its derivatives by ln(variance) included.
 //!
 //! Beside poses the filter starts in their room with hardly any knowledge of where, and takes them as whole
 //! measurements. What the partial measurements say given the poses is then its sums with both less its sums
@@ -13,25 +13,26 @@
 
 use kinematics::{Pose, sin_cos, wrap_to_pi};
 use model_term::ModelTerm;
-use nalgebra::{DMatrix, DVector, Matrix3, MatrixXx3, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::model::{Column, Model};
-use crate::noise::{NOISES, Noise, NoiseComponent};
+use crate::noise::{NOISES, Noise};
 use crate::noise_score::NoiseScore;
 use crate::normal_equations::NormalEquations;
+use crate::partial_noise::{NoiseDerivatives, OF_MOTION};
+use crate::partial_observation::{Observation, Place, Quantity};
 use crate::partial_poses::{PoseUpdate, TakenPoses, Taking};
-use crate::partial_records::{Observation, PartialSegment, Place, Quantity};
+use crate::partial_records::PartialSegment;
+use crate::pass_options::OutlierGate;
 use crate::products::{Products, Sums};
 use crate::propagation::{Moved, Propagator};
 use crate::rounding::PoseVariance;
 use crate::settings::{
-    GYRO_BIAS_SIGMA_RADPS, MIN_DISTANCE_M, RESTART_AFTER_OUTLIERS, START_HEADING_SIGMA_RAD, START_POSITION_SIGMA_M,
-    WALL_DIRECTION_SIGMA_RAD, WALL_OFFSET_SIGMA_M,
+    GYRO_BIAS_SIGMA_RADPS, LIDAR_PLACE_SIGMA_M, MIN_DISTANCE_M, PARTIAL_OUTLIER_CHI_SQUARE, RESTART_AFTER_OUTLIERS,
+    START_HEADING_SIGMA_RAD, START_POSITION_SIGMA_M, WALL_DIRECTION_SIGMA_RAD, WALL_OFFSET_SIGMA_M,
 };
 use crate::thinning::PropagationInterval;
-
-/// Variances that the wheels' motion depends on.
-const OF_MOTION: [NoiseComponent; 2] = [NoiseComponent::Wheel, NoiseComponent::Turn];
+use crate::wall_start::{SeenByLidar, WallDistance, WallStart};
 
 /// Where the bias stands in the state, after the pose.
 const fn bias_at() -> usize {
@@ -41,6 +42,11 @@ const fn bias_at() -> usize {
 /// Where a wall stands, or what comes after so many walls.
 const fn wall_at(wall: usize) -> usize {
     bias_at() + 1 + 2 * wall
+}
+
+/// Where the first copy stands, behind the walls and the lidar that sees them.
+fn first_slot(walls: &WallStart) -> usize {
+    wall_at(walls.walls.len()) + if walls.lidar.is_some() { 3 } else { 0 }
 }
 
 /// Variances of the pose at the start of a segment beside poses.
@@ -58,47 +64,56 @@ struct PartialFilter<'f> {
     covariance: DMatrix<f64>,
     /// ∂state/∂column.
     by: DMatrix<f64>,
-    /// Derivatives of covariance and state by the logarithms of the variances: those of the motion, and
-    /// beside poses those of the instrument.
-    covariance_by: Vec<DMatrix<f64>>,
-    state_by: Vec<DVector<f64>>,
+    noise_by: NoiseDerivatives,
+    /// Heading at which the filter began.
+    origin_rad: f64,
     /// Which place each slot holds.
     slots: Vec<Option<usize>>,
-    noise_score: NoiseScore,
+    /// Outliers by their number.
+    rejected: Vec<usize>,
+    /// Readings of walls that were rejected in a row, headings and distances.
+    wall_outliers_in_a_row: [u32; 2],
+}
+
+/// What a segment's partial measurements say, and which of them are outliers.
+pub(crate) struct Filtered {
+    pub(crate) equations: NormalEquations,
+    pub(crate) score: NoiseScore,
+    pub(crate) outliers: Vec<usize>,
 }
 
 /// What the partial measurements of a segment say, given its `poses`; `propagations` lead to each place after
 /// the first.
 pub(crate) fn filter_partial(
     segment: &PartialSegment<'_>,
-    propagations: &[PropagationInterval],
+    (propagations, gate): (&[PropagationInterval], OutlierGate),
     poses: &TakenPoses<'_>,
     (model, noise): (&Model, &Noise),
     products: &Products,
     terms: &mut [Box<dyn ModelTerm>],
-) -> (NormalEquations, NoiseScore) {
+) -> Filtered {
     let mut filtered = |taking: Taking| {
         let observations: Vec<bool> = segment.observations.iter().map(|of| poses.takes(of, taking)).collect();
-        filter_taken(segment, (propagations, &observations), poses, (model, noise), products, terms)
+        filter_taken(segment, (propagations, &observations, gate), poses, (model, noise), products, terms)
     };
-    let (mut equations, mut score) = filtered(Taking::All);
+    let mut all = filtered(Taking::All);
     if segment.has_poses() {
-        let (of_poses, score_of_poses) = filtered(Taking::PosesAlone);
-        equations.add(&of_poses, -1.0);
-        score.add(&score_of_poses, -1.0);
+        let of_poses = filtered(Taking::PosesAlone);
+        all.equations.add(&of_poses.equations, -1.0);
+        all.score.add(&of_poses.score, -1.0);
     }
-    (equations, score)
+    all
 }
 
 /// Filters the observations of a segment that are taken.
 pub(crate) fn filter_taken(
     segment: &PartialSegment<'_>,
-    (propagations, taken): (&[PropagationInterval], &[bool]),
+    (propagations, taken, gate): (&[PropagationInterval], &[bool], OutlierGate),
     poses: &TakenPoses<'_>,
     (model, noise): (&Model, &Noise),
     products: &Products,
     terms: &mut [Box<dyn ModelTerm>],
-) -> (NormalEquations, NoiseScore) {
+) -> Filtered {
     let columns = Column::BASE.len() + terms.iter().map(|term| term.parameters().len()).sum::<usize>();
     let mut sums = Sums::new(columns, products);
     let mut filter = PartialFilter::new(segment, taken, poses.start(segment, model), columns);
@@ -135,12 +150,13 @@ pub(crate) fn filter_taken(
                         filter.update_pose(&of, columns, &mut sums);
                     }
                 }
-                _ => filter.update(of, model, columns, &mut sums),
+                _ => filter.update_gated((at, of), gate, model, columns, &mut sums),
             }
             filter.forget(at);
         }
     }
-    (sums.eliminated(segment.segment.run, columns).0, filter.noise_score)
+    let equations = sums.eliminated(segment.segment.run, columns).0;
+    Filtered { equations, score: filter.noise_by.score, outliers: filter.rejected }
 }
 
 impl<'f> PartialFilter<'f> {
@@ -152,19 +168,26 @@ impl<'f> PartialFilter<'f> {
             last_use[of.to] = Some(number);
         }
         let slots = most_at_once(segment, &last_use);
-        let first_slot = wall_at(segment.walls.len());
+        let first_slot = first_slot(&segment.walls);
         let size = first_slot + 3 * slots;
         let (mut state, mut covariance) = (DVector::zeros(size), DMatrix::zeros(size, size));
         covariance[(bias_at(), bias_at())] = GYRO_BIAS_SIGMA_RADPS.powi(2);
         let origin = start.unwrap_or(Pose::IDENTITY);
         (state[0], state[1], state[2]) = (origin.x_m, origin.y_m, origin.theta_rad);
-        for (wall, of) in segment.walls.iter().enumerate() {
+        let yaw_rad = segment.walls.lidar.map_or(0.0, |lidar| lidar.yaw_rad);
+        for (wall, of) in segment.walls.walls.iter().enumerate() {
             let at = wall_at(wall);
             let direction_rad = origin.theta_rad + of.direction_rad;
-            let (sin, cos) = sin_cos(direction_rad);
+            let (sin, cos) = sin_cos(direction_rad + yaw_rad);
             (state[at], state[at + 1]) = (direction_rad, of.offset_m - sin * origin.x_m + cos * origin.y_m);
             covariance[(at, at)] = WALL_DIRECTION_SIGMA_RAD.powi(2);
             covariance[(at + 1, at + 1)] = WALL_OFFSET_SIGMA_M.powi(2);
+        }
+        if let Some(lidar) = segment.walls.lidar {
+            let at = wall_at(segment.walls.walls.len());
+            (state[at], state[at + 1], state[at + 2]) = (lidar.lever_m[0], lidar.lever_m[1], lidar.yaw_rad);
+            let sigmas = [LIDAR_PLACE_SIGMA_M, LIDAR_PLACE_SIGMA_M, WALL_DIRECTION_SIGMA_RAD];
+            (0..3).for_each(|row| covariance[(at + row, at + row)] = sigmas[row].powi(2));
         }
         if start.is_some() {
             (0..3).for_each(|row| covariance[(row, row)] = START_VARIANCE[row]);
@@ -176,10 +199,11 @@ impl<'f> PartialFilter<'f> {
             state,
             covariance,
             by: DMatrix::zeros(size, columns),
-            covariance_by: vec![DMatrix::zeros(size, size); noises],
-            state_by: vec![DVector::zeros(size); noises],
+            noise_by: NoiseDerivatives::new(size, noises),
+            origin_rad: origin.theta_rad,
             slots: vec![None; slots],
-            noise_score: NoiseScore::zero(),
+            rejected: Vec::new(),
+            wall_outliers_in_a_row: [0; 2],
         }
     }
 
@@ -201,8 +225,14 @@ impl<'f> PartialFilter<'f> {
         Pose::new(self.state[at], self.state[at + 1], self.state[at + 2])
     }
 
+    fn seen_by_lidar(&self, wall: usize) -> Option<SeenByLidar> {
+        let WallStart { walls, lidar } = &self.segment.walls;
+        let at = wall_at(walls.len());
+        Some(SeenByLidar { at, start: (*lidar)?, direction_rad: self.origin_rad + walls[wall].direction_rad })
+    }
+
     fn slot_at(&self, slot: usize) -> usize {
-        wall_at(self.segment.walls.len()) + 3 * slot
+        first_slot(&self.segment.walls) + 3 * slot
     }
 
     /// Where the copy of a place stands in the state.
@@ -235,8 +265,8 @@ impl<'f> PartialFilter<'f> {
             }
         };
         carry(&mut self.covariance);
-        self.covariance_by.iter_mut().for_each(carry);
-        for by in &mut self.state_by {
+        self.noise_by.covariance_by.iter_mut().for_each(carry);
+        for by in &mut self.noise_by.state_by {
             let theta = by[2];
             by[0] -= step.y * theta;
             by[1] += step.x * theta;
@@ -247,7 +277,7 @@ impl<'f> PartialFilter<'f> {
             let added = motion.matrix(component as usize) * noise.variance[component as usize];
             for (row, column) in (0..9).map(|at| (at / 3, at % 3)) {
                 self.covariance[(row, column)] += added[(row, column)];
-                self.covariance_by[k][(row, column)] += added[(row, column)];
+                self.noise_by.covariance_by[k][(row, column)] += added[(row, column)];
             }
         }
         let of_terms = by_terms.iter().enumerate().map(|(k, by)| (Column::BASE.len() + k, *by));
@@ -277,10 +307,10 @@ impl<'f> PartialFilter<'f> {
             }
         };
         copy(&mut self.covariance);
-        self.covariance_by.iter_mut().for_each(copy);
+        self.noise_by.covariance_by.iter_mut().for_each(copy);
         for k in 0..3 {
             self.state[at + k] = self.state[k];
-            self.state_by.iter_mut().for_each(|by| by[at + k] = by[k]);
+            self.noise_by.state_by.iter_mut().for_each(|by| by[at + k] = by[k]);
             for column in 0..self.by.ncols() {
                 self.by[(at + k, column)] = self.by[(k, column)];
             }
@@ -337,12 +367,8 @@ impl<'f> PartialFilter<'f> {
                 wrap_to_pi(of.value - (at(to, 2) - self.state[wall]))
             }
             Quantity::WallDistance(wall) => {
-                let wall = wall_at(wall);
-                let (sin, cos) = sin_cos(self.state[wall]);
-                // n = (−sin, cos); offset − n·p.
-                (by[to], by[to + 1]) = (sin, -cos);
-                (by[wall], by[wall + 1]) = (cos * at(to, 0) + sin * at(to, 1), 1.0);
-                of.value - (self.state[wall + 1] + sin * at(to, 0) - cos * at(to, 1))
+                let lidar = self.seen_by_lidar(wall);
+                of.value - WallDistance { pose: to, wall: wall_at(wall), lidar }.predicted(&self.state, &mut by)
             }
             Quantity::GyroTurn { dt_s } => {
                 let scale = 1.0 + model.gyro_scale;
@@ -358,13 +384,53 @@ impl<'f> PartialFilter<'f> {
         (off, by)
     }
 
-    fn update(&mut self, of: &Observation, model: &Model, columns: usize, sums: &mut Sums<'_>) {
+    /// Takes an observation unless it is an outlier. Where readings of a wall are so in a row, the robot is
+    /// not where the filter has it, which starts anew there.
+    fn update_gated(
+        &mut self,
+        (number, of): (usize, &Observation),
+        gate: OutlierGate,
+        model: &Model,
+        columns: usize,
+        sums: &mut Sums<'_>,
+    ) {
+        let kind = match of.quantity {
+            Quantity::WallHeading(_) => Some(0),
+            Quantity::WallDistance(_) => Some(1),
+            _ => None,
+        };
+        let mut is_taken = self.update(of, gate, model, columns, sums);
+        if let Some(in_a_row) = kind.map(|kind| &mut self.wall_outliers_in_a_row[kind]) {
+            *in_a_row = if is_taken { 0 } else { *in_a_row + 1 };
+            if *in_a_row >= RESTART_AFTER_OUTLIERS {
+                *in_a_row = 0;
+                self.start_anew(of.to);
+                is_taken = self.update(of, gate, model, columns, sums);
+            }
+        }
+        if !is_taken {
+            self.rejected.push(number);
+        }
+    }
+
+    /// Takes an observation; says whether it passes the gate.
+    fn update(
+        &mut self,
+        of: &Observation,
+        gate: OutlierGate,
+        model: &Model,
+        columns: usize,
+        sums: &mut Sums<'_>,
+    ) -> bool {
         if let Quantity::GyroTurn { dt_s } = of.quantity {
             self.covariance[(bias_at(), bias_at())] += self.segment.bias_walk * dt_s;
         }
         let (v, row) = self.predicted(of, model);
         let ph = &self.covariance * &row;
         let s = row.dot(&ph) + of.variance;
+        if gate == OutlierGate::On && v * v > PARTIAL_OUTLIER_CHI_SQUARE * s {
+            return false;
+        }
         let gain = &ph / s;
         // ∂v/∂column, and a place for the free heading that these segments do not have.
         let mut j: Vec<f64> = (-(row.transpose() * &self.by)).iter().copied().collect();
@@ -374,11 +440,12 @@ impl<'f> PartialFilter<'f> {
         }
         j.resize(columns + 1, 0.0);
         sums.add([&j], [v], [s]);
-        self.score_noise(&row, &gain, v, s);
+        self.noise_by.take_scalar(&row, &gain, v, s);
         self.state += &gain * v;
         self.covariance -= &gain * ph.transpose();
         let j = nalgebra::RowDVector::from_row_slice(&j[..columns]);
         self.by += &gain * j;
+        true
     }
 
     /// Takes a measured pose. With S = L Lᵀ the components of L⁻¹ v are independent.
@@ -407,55 +474,10 @@ impl<'f> PartialFilter<'f> {
         }
         let inverse = root.inverse();
         let gain = &ph * inverse;
-        self.score_pose(of, &gain, &inverse);
+        self.noise_by.take_pose(of, &gain, &inverse);
         self.state += &gain * of.innovation;
         self.covariance -= &gain * ph.transpose();
         self.by += &gain * by;
-    }
-
-    /// The recursions differentiated, as in [`crate::noise_score`].
-    fn score_pose(&mut self, of: &PoseUpdate, gain: &MatrixXx3<f64>, inverse: &Matrix3<f64>) {
-        let (h, weighted) = (&of.by_state, inverse * of.innovation);
-        let (mut s_by, mut v_by) = ([Matrix3::zeros(); NOISES], [Vector3::zeros(); NOISES]);
-        for a in 0..self.covariance_by.len() {
-            let ph_by = &self.covariance_by[a] * h;
-            s_by[a] = h.tr_mul(&ph_by);
-            if let Some(own) = a.checked_sub(OF_MOTION.len()) {
-                s_by[a] += of.errors_by[own];
-            }
-            v_by[a] = -h.tr_mul(&self.state_by[a]);
-            self.state_by[a] += (&ph_by - gain * s_by[a]) * weighted + gain * v_by[a];
-            let half = (&ph_by - gain * (s_by[a] * 0.5)) * gain.transpose();
-            self.covariance_by[a] -= &half + half.transpose();
-        }
-        for a in 0..NOISES {
-            self.noise_score.gradient[a] +=
-                0.5 * ((inverse * s_by[a]).trace() - weighted.dot(&(s_by[a] * weighted))) + v_by[a].dot(&weighted);
-            for b in 0..NOISES {
-                self.noise_score.information[(a, b)] +=
-                    0.5 * (inverse * s_by[a] * inverse * s_by[b]).trace() + v_by[a].dot(&(inverse * v_by[b]));
-            }
-        }
-    }
-
-    /// The recursions differentiated, as in [`crate::filter`].
-    fn score_noise(&mut self, row: &DVector<f64>, gain: &DVector<f64>, v: f64, s: f64) {
-        let (mut s_by, mut v_by) = ([0.0; NOISES], [0.0; NOISES]);
-        for a in 0..self.covariance_by.len() {
-            let ph_by = &self.covariance_by[a] * row;
-            s_by[a] = row.dot(&ph_by);
-            v_by[a] = -row.dot(&self.state_by[a]);
-            self.state_by[a] += (&ph_by - gain * s_by[a]) * (v / s) + gain * v_by[a];
-            let half = &ph_by - gain * (0.5 * s_by[a]);
-            let change = gain * half.transpose();
-            self.covariance_by[a] -= &change + change.transpose();
-        }
-        for a in 0..NOISES {
-            self.noise_score.gradient[a] += 0.5 * (s_by[a] / s) * (1.0 - v * v / s) + v_by[a] * v / s;
-            for b in 0..NOISES {
-                self.noise_score.information[(a, b)] += 0.5 * (s_by[a] / s) * s_by[b] / s + v_by[a] * v_by[b] / s;
-            }
-        }
     }
 }
 

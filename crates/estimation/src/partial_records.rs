@@ -7,61 +7,15 @@
 
 use std::collections::BTreeMap;
 
-use dataset::{GyroNoise, Run, RunView, Session};
-use kinematics::{Pose, Wheels};
+use dataset::{GyroNoise, LidarExtrinsics, Run, RunView, Session};
+use kinematics::Wheels;
 
 use crate::model::Model;
+use crate::partial_observation::{Observation, Place, Quantity};
 use crate::segment::{Segment, Start};
-use crate::settings::{GYRO_WINDOW_S, MIN_STANDING_PAIRS, TIME_TOLERANCE_S, WALL_START_DIRECTIONS, WALL_START_STEPS};
+use crate::settings::{GYRO_WINDOW_S, MIN_STANDING_PAIRS, TIME_TOLERANCE_S};
+use crate::wall_start::WallStart;
 use crate::wheel_angles::WheelAngleInterpolator;
-
-/// Where the robot stood at an instant that a measurement is of.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Place {
-    /// Number of intervals of the segment before it.
-    pub(crate) after: usize,
-    /// Variances of the wheels' turns beyond rounding, where it lies within a row, rad².
-    pub(crate) interpolated_rad2: Wheels<f64>,
-}
-
-/// What an observation is a function of.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Quantity {
-    /// A coordinate of the pose at the end seen from that at the start: 0 ahead, 1 to the left, 2 the turn.
-    Displacement(usize),
-    /// The straight distance between both places.
-    Distance,
-    /// The distance from a wall, by its index.
-    WallDistance(usize),
-    /// The heading along a wall, by its index.
-    WallHeading(usize),
-    /// The turn between both places by a gyroscope, with its bias over this time.
-    GyroTurn {
-        /// Length of the window, seconds.
-        dt_s: f64,
-    },
-    /// A measured pose, by its segment of the records and its index there; value and variance are its own.
-    MeasuredPose { segment: usize, measurement: usize },
-}
-
-/// A scalar that was measured.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Observation {
-    /// Indices of its places; equal where it is of one instant, or the robot stood.
-    pub(crate) from: usize,
-    pub(crate) to: usize,
-    pub(crate) quantity: Quantity,
-    pub(crate) value: f64,
-    pub(crate) variance: f64,
-}
-
-/// A wall by its direction and its distance from the segment's start: points p of it have n·p = `offset_m`, n
-/// to the left of its direction.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Wall {
-    pub(crate) direction_rad: f64,
-    pub(crate) offset_m: f64,
-}
 
 /// The partial measurements of a run, without a gap of its log between them.
 #[derive(Debug, Clone)]
@@ -72,8 +26,8 @@ pub(crate) struct PartialSegment<'a> {
     pub(crate) places: Vec<Place>,
     /// In the order of the places where they end.
     pub(crate) observations: Vec<Observation>,
-    /// Where the filter begins with the walls.
-    pub(crate) walls: Vec<Wall>,
+    /// Where the filter begins with the walls, and with the lidar that sees them.
+    pub(crate) walls: WallStart,
     /// Variance of the gyroscope's bias per second, (rad/s)²/s.
     pub(crate) bias_walk: f64,
 }
@@ -121,7 +75,7 @@ pub(crate) fn partial_segments<'a>(
     (poses, first): (&[Segment<'a>], usize),
     track: &WheelAngleInterpolator<'_>,
     nominal: &Model,
-    gyro: &GyroSettings,
+    (gyro, lidar): (&GyroSettings, Option<LidarExtrinsics>),
 ) -> Vec<PartialSegment<'a>> {
     let (mut timed, walls) = tape_and_walls(run.run());
     timed.extend(gyro.windows(run, track));
@@ -181,7 +135,7 @@ pub(crate) fn partial_segments<'a>(
             .collect();
         // Between equals the order of the files.
         observations.sort_by_key(|of| of.to);
-        let walls = start_walls(&segment, &places, &observations, walls, nominal);
+        let walls = WallStart::of((&segment, &places, &observations), walls, nominal, lidar);
         let bias_walk = gyro.stated.bias_walk_radps_per_sqrt_s.unwrap_or(crate::settings::BIAS_WALK_RADPS).powi(2);
         PartialSegment { segment, places, observations, walls, bias_walk }
     };
@@ -234,73 +188,6 @@ fn tape_and_walls(run: &Run) -> (Vec<Timed>, usize) {
         variance: of.sigma_rad * of.sigma_rad,
     }));
     (timed, compass + usize::from(!run.headings.is_empty()))
-}
-
-/// The walls by the nominal drive: their directions from a heading where one was measured, else from the
-/// distances alone, by least squares from several directions.
-fn start_walls(
-    segment: &Segment<'_>,
-    places: &[Place],
-    observations: &[Observation],
-    walls: usize,
-    nominal: &Model,
-) -> Vec<Wall> {
-    let (mut pose, mut after) = (Pose::IDENTITY, 0);
-    let mut poses = Vec::with_capacity(places.len());
-    for place in places {
-        for interval in &segment.intervals[after..place.after] {
-            pose = pose * nominal.increment(interval.wheel_rad).arc();
-        }
-        after = place.after;
-        poses.push(pose);
-    }
-    let of_wall = |wall: usize| {
-        let distances: Vec<(Pose, f64)> = observations
-            .iter()
-            .filter(|of| of.quantity == Quantity::WallDistance(wall))
-            .map(|of| (poses[of.to], of.value))
-            .collect();
-        let heading = observations.iter().find(|of| of.quantity == Quantity::WallHeading(wall));
-        let direction = heading.map(|of| poses[of.to].theta_rad - of.value);
-        match direction {
-            Some(direction_rad) => fitted_offset(direction_rad, &distances).0,
-            None => (0..WALL_START_DIRECTIONS)
-                .map(|k| std::f64::consts::TAU * f64::from(k) / f64::from(WALL_START_DIRECTIONS))
-                .map(|direction_rad| turned_to_fit(direction_rad, &distances))
-                .min_by(|a, b| a.1.total_cmp(&b.1))
-                .map_or(Wall { direction_rad: 0.0, offset_m: 0.0 }, |(wall, _)| wall),
-        }
-    };
-    (0..walls).map(of_wall).collect()
-}
-
-/// The wall of a direction that fits distances from it best, and the sum of the squares that are left, m².
-fn fitted_offset(direction_rad: f64, distances: &[(Pose, f64)]) -> (Wall, f64) {
-    let (sin, cos) = direction_rad.sin_cos();
-    let offsets_m = || distances.iter().map(|(pose, distance_m)| distance_m - sin * pose.x_m + cos * pose.y_m);
-    let offset_m = offsets_m().sum::<f64>() / distances.len().max(1) as f64;
-    (Wall { direction_rad, offset_m }, offsets_m().map(|of| (of - offset_m).powi(2)).sum())
-}
-
-/// The same with the direction turned by Newton steps on the variance of the offsets.
-fn turned_to_fit(mut direction_rad: f64, distances: &[(Pose, f64)]) -> (Wall, f64) {
-    for _ in 0..WALL_START_STEPS {
-        let (wall, _) = fitted_offset(direction_rad, distances);
-        let (sin, cos) = direction_rad.sin_cos();
-        let slope_m = |pose: &Pose| -cos * pose.x_m - sin * pose.y_m;
-        let mean_m = distances.iter().map(|(pose, _)| slope_m(pose)).sum::<f64>() / distances.len().max(1) as f64;
-        let (mut gradient, mut curvature) = (0.0, 0.0);
-        for (pose, distance_m) in distances {
-            let off_m = distance_m - sin * pose.x_m + cos * pose.y_m - wall.offset_m;
-            gradient += off_m * (slope_m(pose) - mean_m);
-            curvature += (slope_m(pose) - mean_m).powi(2);
-        }
-        if curvature <= 0.0 {
-            break;
-        }
-        direction_rad -= gradient / curvature;
-    }
-    fitted_offset(direction_rad, distances)
 }
 
 /// A session's gyroscope.

@@ -13,10 +13,10 @@ use crate::model::{Column, Model};
 use crate::noise::Noise;
 use crate::noise_score::{NoiseScore, TimingScore};
 use crate::normal_equations::NormalEquations;
-use crate::partial_filter::filter_partial;
+use crate::partial_filter::{Filtered, filter_partial};
 use crate::partial_poses::TakenPoses;
 use crate::partial_records::PartialSegment;
-use crate::pass_options::PassOptions;
+use crate::pass_options::{OutlierGate, PassOptions};
 use crate::products::Products;
 use crate::propagation::{CachedPropagation, CarriedState, PropagationSource, SegmentCache};
 use crate::records::Records;
@@ -36,6 +36,8 @@ pub struct Pass {
     pub samples: Vec<Vec<KinematicSample>>,
     /// Outliers of the first phase: segment and measurement.
     pub outliers: Vec<(usize, usize)>,
+    /// The same of partial measurements, by the records' parts of runs.
+    pub(crate) partial_outliers: Vec<(usize, usize)>,
     /// Score of the cost by the logarithms of the variances.
     pub(crate) noise: NoiseScore,
     /// Score by the variance of the instants of measurements.
@@ -67,6 +69,7 @@ impl Pass {
             innovations: Vec::new(),
             samples: Vec::new(),
             outliers: Vec::new(),
+            partial_outliers: Vec::new(),
             noise: NoiseScore::zero(),
             timing: TimingScore::default(),
             headings: Vec::new(),
@@ -199,9 +202,13 @@ pub(crate) fn pass(
         }
     }
     let with_partial = selections.iter().zip(&outliers).filter(|_| records.has_partial());
-    for (selection, rejected) in with_partial {
+    for (phase, (selection, rejected)) in with_partial.enumerate() {
         let poses = TakenPoses::of(&records.segments, free_headings, &selection.propagations, rejected);
-        add_partial(&mut result, (records, selection, weight), &poses, (model, noise), &products, terms);
+        let part = (records, selection, weight);
+        let found = add_partial(&mut result, part, (&poses, pass_options.gate), (model, noise), &products, terms);
+        if phase == 0 {
+            result.partial_outliers = found;
+        }
     }
     result.outliers = outliers.into_iter().next().unwrap_or_default();
     result.cached = pass_options.keep.then(|| CachedPropagation { model: model.clone(), phases });
@@ -212,26 +219,28 @@ pub(crate) fn pass(
 }
 
 /// Adds the partial measurements to the normal equations of their runs, and what is known of the gyroscope's
-/// scale to that of the first run which has one.
+/// scale to that of the first run which has one. Gives the outliers.
 fn add_partial(
     result: &mut Pass,
     (records, selection, weight): (&Records<'_>, &Selection, f64),
-    poses: &TakenPoses<'_>,
+    (poses, gate): (&TakenPoses<'_>, OutlierGate),
     (model, noise): (&Model, &Noise),
     products: &Products,
     terms: &[Box<dyn ModelTerm>],
-) {
+) -> Vec<(usize, usize)> {
     let columns = Column::BASE.len() + terms.iter().map(|term| term.parameters().len()).sum::<usize>();
     let mut prior = records.gyro_scale_sigma.map(|sigma| sigma.powi(-2));
     let filtered = |terms: &mut Vec<Box<dyn ModelTerm>>,
                     of: (&PartialSegment<'_>, &Option<Vec<PropagationInterval>>)| {
-        Some(filter_partial(of.0, of.1.as_ref()?, poses, (model, noise), products, terms))
+        Some(filter_partial(of.0, (of.1.as_ref()?, gate), poses, (model, noise), products, terms))
     };
     let segments = records.partial.par_iter().zip(&selection.partial);
     let found: Vec<_> = segments.map_init(|| terms.to_vec(), filtered).collect();
     // Sums are taken in the order of the segments.
-    for (partial, found) in records.partial.iter().zip(found) {
-        let Some((equations, score)) = found else { continue };
+    let mut all_outliers = Vec::new();
+    for (number, (partial, found)) in records.partial.iter().zip(found).enumerate() {
+        let Some(Filtered { equations, score, outliers }) = found else { continue };
+        all_outliers.extend(outliers.into_iter().map(|observation| (number, observation)));
         let run = partial.segment.run;
         let at = result.runs.partition_point(|of| of.run < run);
         if result.runs.get(at).is_none_or(|of| of.run != run) {
@@ -246,6 +255,7 @@ fn add_partial(
             result.runs[at].chi_square += weight * precision * model.gyro_scale.powi(2);
         }
     }
+    all_outliers
 }
 
 /// The segments of each run, which are consecutive.

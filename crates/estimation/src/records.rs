@@ -77,7 +77,8 @@ impl<'a> Records<'a> {
                     add_displacements(&mut records.segments, &base, &track, run.run());
                     if let Some(nominal) = &nominal {
                         let poses = (&records.segments[before..], before);
-                        let partial = partial_segments(run, &base, poses, &track, nominal, &gyro);
+                        let partial =
+                            partial_segments(run, &base, poses, &track, nominal, (&gyro, session.truth_noise.lidar));
                         has_partial = !partial.is_empty();
                         records.partial.extend(partial);
                     }

@@ -2,6 +2,7 @@
 
 use crate::error::RosBagError;
 use crate::gyro;
+use crate::laser_scan::LASER_SCAN;
 use crate::topics::{Survey, TRANSFORMS, Topic};
 use crate::truth::TRUTH_TYPES;
 use crate::wheels::{WHEEL_TYPES, WheelQuantity, has_joints, wheel_joints};
@@ -66,6 +67,11 @@ pub(crate) fn gyro_rank(topic: &Topic) -> Rank {
     is_gyro.then(|| u8::from(contains(topic, &["raw"])))
 }
 
+/// Scans of a lidar on the robot.
+pub(crate) fn scan_rank(topic: &Topic) -> Rank {
+    (topic.count > 1 && topic.type_name == LASER_SCAN).then_some(0)
+}
+
 /// Are these poses, which the user named, likely the robot's own odometry, or what was fused from it?
 pub(crate) fn is_own_estimate(topic: &Topic, frames: Option<&(String, String)>) -> bool {
     if topic.type_name == TRANSFORMS {
@@ -98,7 +104,11 @@ fn choose<'a>(
         [] => Err(undecided(none(), format!("{flag} TOPIC"))),
         ref several => {
             let named: Vec<String> = several.iter().map(|topic| format!("{flag} {}", topic.name)).collect();
-            let what = if flag == "--wheels" { "wheels" } else { "poses of the instrument" };
+            let what = match flag {
+                "--wheels" => "wheels",
+                "--scan" => "lidar, and none has poses of an outside instrument",
+                _ => "poses of the instrument",
+            };
             Err(undecided(format!("{} topics may be the {what}", several.len()), named.join(" or ")))
         }
     }
@@ -126,8 +136,40 @@ pub(crate) fn gyro(survey: &Survey) -> (Option<&Topic>, Option<String>) {
     }
 }
 
+/// What the robot is compared with: poses, scans that show walls, or both.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Reference<'a> {
+    pub(crate) truth: Option<&'a Topic>,
+    pub(crate) scan: Option<&'a Topic>,
+}
+
+/// The topics of the reference, of which a user may have named either. Without a name scans are taken where
+/// no topic has poses.
+pub(crate) fn reference<'a>(
+    survey: &'a Survey,
+    bag: &std::path::Path,
+    [named_truth, named_scan]: [Option<&str>; 2],
+) -> Result<Reference<'a>, RosBagError> {
+    let named = |flag, topic: Option<&str>| topic.map(|topic| survey.named(flag, topic)).transpose();
+    let (named_truth, scan) = (named("--truth", named_truth)?, named("--scan", named_scan)?);
+    if let Some(topic) = scan.filter(|topic| topic.type_name != LASER_SCAN) {
+        let why = format!("no type of scans; expected {LASER_SCAN}");
+        return Err(RosBagError::Unusable { topic: topic.name.clone(), type_name: topic.type_name.clone(), why });
+    }
+    if named_truth.is_some() {
+        return Ok(Reference { truth: named_truth, scan });
+    }
+    let has_poses = survey.topics.values().any(|topic| truth_rank(topic).is_some());
+    let has_scans = survey.topics.values().any(|topic| scan_rank(topic).is_some());
+    if !has_poses && scan.is_none() && has_scans {
+        return Ok(Reference { truth: None, scan: Some(choose(survey, bag, scan_rank, "--scan", String::new)?) });
+    }
+    let truth = if has_poses || scan.is_none() { Some(truth(survey, bag)?) } else { None };
+    Ok(Reference { truth, scan })
+}
+
 /// The topic of the poses.
-pub(crate) fn truth<'a>(survey: &'a Survey, bag: &std::path::Path) -> Result<&'a Topic, RosBagError> {
+fn truth<'a>(survey: &'a Survey, bag: &std::path::Path) -> Result<&'a Topic, RosBagError> {
     choose(survey, bag, truth_rank, "--truth", || {
         let is_pose =
             |topic: &&Topic| topic.type_name == TRANSFORMS || TRUTH_TYPES.iter().any(|(of, ..)| *of == topic.type_name);

@@ -10,16 +10,17 @@ use dataset::{
     moving_pieces, wrap_warnings,
 };
 use kinematics::{DriveGeometry, Wheels};
-use serde::Serialize;
 
 use crate::bag::Bag;
-use crate::choice;
+use crate::choice::{self, Reference};
 use crate::clock::{self, Clock, Times, seconds};
 use crate::error::RosBagError;
 use crate::gyro::IMU;
 use crate::gyro_column::GyroColumn;
 use crate::recorded::recorded;
 use crate::rows::{self, BothRows, Others, RECEIPT_MARGIN_S, Rows, WheelRows, WheelSource};
+use crate::scan_walls::{self, RunSpan};
+use crate::took::Took;
 use crate::topics::{Survey, Topic};
 use crate::truth::{self, TruthReader, TruthReading};
 use crate::wheel_pair::{Resampling, WheelPair};
@@ -45,6 +46,9 @@ pub struct Options {
     pub wheels: Option<String>,
     /// Topic of the poses of an outside instrument.
     pub truth: Option<String>,
+    /// Topic of the scans of a lidar in which walls are sought; where none is said, the only one of a bag
+    /// that has no poses.
+    pub scan: Option<String>,
     /// Topic of a gyroscope's rates; where none is said, the only one of the bag.
     pub gyro: Option<String>,
     /// Which joints or fields are the wheels.
@@ -60,36 +64,6 @@ pub struct Options {
     pub cut_s: Option<f64>,
     /// The robot.
     pub robot: RobotGiven,
-}
-
-/// What was taken of a topic.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct TookTopic {
-    /// Its name.
-    pub topic: String,
-    /// Its type.
-    #[serde(rename = "type")]
-    pub type_name: String,
-    /// Which joints, fields or frames.
-    pub what: String,
-    /// What wheels' numbers are: ticks, rad, radps, mps, twist; `pose` of an instrument, `radps` of a
-    /// gyroscope.
-    pub quantity: &'static str,
-    /// Rows that were taken.
-    pub rows: usize,
-    /// `header stamps` or `receive times`.
-    pub times: &'static str,
-}
-
-/// What was taken for what.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Took {
-    /// The wheels.
-    pub wheels: TookTopic,
-    /// The poses.
-    pub truth: TookTopic,
-    /// The gyroscope, where there is one.
-    pub gyro: Option<TookTopic>,
 }
 
 /// A dataset from a bag.
@@ -117,15 +91,13 @@ pub fn import(path: &Path, options: &Options) -> Result<FromBag, RosBagError> {
         },
         None => WheelTopics::One(choice::wheels(&survey, path)?),
     };
-    let truth = match &options.truth {
-        Some(topic) => survey.named("--truth", topic)?,
-        None => choice::truth(&survey, path)?,
-    };
+    let named = [&options.truth, &options.scan].map(Option::as_deref);
+    let Reference { truth, scan } = choice::reference(&survey, path, named)?;
     let (gyro, gyro_open) = match &options.gyro {
         Some(topic) => (Some(named_gyro(&survey, topic)?), None),
         None => choice::gyro(&survey),
     };
-    if wheels.has(&truth.name) {
+    if let Some(truth) = truth.filter(|truth| wheels.has(&truth.name)) {
         let (topic, type_name) = (truth.name.clone(), truth.type_name.clone());
         let why = "its poses are computed from its wheels; --truth takes poses of an outside instrument".to_owned();
         return Err(RosBagError::Unusable { topic, type_name, why });
@@ -143,8 +115,10 @@ pub fn import(path: &Path, options: &Options) -> Result<FromBag, RosBagError> {
             (WheelSource::Two(pair, resampling), what, None)
         }
     };
-    let truth_reader = TruthReader::new(truth, options.truth_frames.as_ref())?;
-    let others = Others { truth: (&truth.name, &truth_reader), gyro: gyro.map(|topic| &topic.name[..]) };
+    let reader = |truth: &Topic| TruthReader::new(truth, options.truth_frames.as_ref());
+    let truth_reader = truth.map(reader).transpose()?;
+    let of_truth = truth.map(|topic| &topic.name[..]).zip(truth_reader.as_ref());
+    let others = Others { truth: of_truth, gyro: gyro.map(|topic| &topic.name[..]) };
     let both = rows::read(&bag, &source, others)?;
 
     let given = RobotGiven { counter_bits: options.robot.counter_bits.or(counter_bits), ..options.robot };
@@ -156,9 +130,9 @@ pub fn import(path: &Path, options: &Options) -> Result<FromBag, RosBagError> {
     let (robot, geometry) = given.nominal(is_counted, path, what)?;
     let mut warnings = both.losses.clone();
     warnings.extend(both.wheels.warnings());
-    warnings.extend(both.truth.warnings());
-    let is_own_estimate = choice::is_own_estimate(truth, options.truth_frames.as_ref());
-    if is_own_estimate {
+    warnings.extend(both.truth.iter().flat_map(Rows::warnings));
+    let own_estimate = truth.filter(|truth| choice::is_own_estimate(truth, options.truth_frames.as_ref()));
+    if let Some(truth) = own_estimate {
         warnings.push(format!(
             "topic {}: poses of this name and type are mostly computed from the wheels themselves; calibration needs an independent instrument",
             truth.name
@@ -167,11 +141,21 @@ pub fn import(path: &Path, options: &Options) -> Result<FromBag, RosBagError> {
     let clocks = clocks(&both, &mut warnings)?;
     warnings.extend(gyro_open);
     let gyro = gyro_column(&both, clocks[0], options, &mut warnings)?;
-    let took = took(&both, [wheels_what, truth_reader.describe()], clocks, gyro.is_some());
-    let mut dataset = assemble(&both, clocks, gyro, (robot, geometry), path, options, &mut warnings)?;
-    if is_own_estimate {
+    let has_gyro = gyro.is_some();
+    let (mut dataset, spans) = assemble(&both, clocks, gyro, (robot, geometry), path, options, &mut warnings)?;
+    if let Some(truth) = own_estimate {
         warnings.extend(truth::scale_covariances(&mut dataset, &truth.name));
     }
+    let mut scans = None;
+    if let Some(scan) = scan {
+        let of = (&bag, scan, clocks[0]);
+        scans = Some((&scan.name[..], scan_walls::add_walls(&mut dataset, &spans, of, &both.frames, &mut warnings)?));
+        dataset.runs.retain(|run| !run.truth.is_empty() || !run.walls.is_empty());
+        let notes = dataset.provenance.notes.take().unwrap_or_default();
+        dataset.provenance.notes = Some(format!("{notes}, walls of {} ({})", scan.name, scan.type_name));
+    }
+    let whats = (wheels_what, truth_reader.as_ref().map(TruthReader::describe));
+    let took = Took::of(&both, whats, clocks, has_gyro, scans);
     warnings.extend(wrap_warnings(&dataset).iter().map(ToString::to_string));
     Ok(FromBag { dataset, took, warnings })
 }
@@ -229,34 +213,15 @@ fn ends(times: &[Times], clock: Clock) -> (i64, i64) {
     times.clone().min().zip(times.max()).unwrap_or_default()
 }
 
-fn took(both: &BothRows, [wheels_what, truth_what]: [String; 2], clocks: [Clock; 2], has_gyro: bool) -> Took {
-    fn topic<T>(rows: &Rows<T>, what: String, quantity: &'static str, clock: Clock) -> TookTopic {
-        TookTopic {
-            topic: rows.topic.clone(),
-            type_name: rows.type_name.clone(),
-            what,
-            quantity,
-            rows: rows.values.len(),
-            times: if clock == Clock::Stamps { "header stamps" } else { "receive times" },
-        }
-    }
-    Took {
-        wheels: topic(&both.wheels, wheels_what, both.quantity.name(), clocks[0]),
-        truth: topic(&both.truth, truth_what, "pose", clocks[1]),
-        gyro: both.gyro.as_ref().filter(|_| has_gyro).map(|gyro| {
-            let frame = if gyro.frame.is_empty() { "an unnamed frame" } else { &gyro.frame };
-            let what = format!("angular_velocity.z of {frame}, whose z is taken as up");
-            topic(&gyro.rows, what, "radps", clocks[0])
-        }),
-    }
-}
-
 /// The clocks of wheels and poses; both by receipt where stamps and receipts do not meet.
 fn clocks(both: &BothRows, warnings: &mut Vec<String>) -> Result<[Clock; 2], RosBagError> {
-    let all = [&both.wheels.times[..], &both.truth.times[..]];
-    let topics = [&both.wheels.topic, &both.truth.topic];
+    // Scans go by the wheels' clock.
+    let truth = both.truth.as_ref().map(|truth| (&truth.times[..], &truth.topic));
+    let (truth_times, truth_topic) = truth.unwrap_or((&both.wheels.times, &both.wheels.topic));
+    let all = [&both.wheels.times[..], truth_times];
+    let topics = [&both.wheels.topic, truth_topic];
     let clocks = all.map(clock::clock);
-    for (clock, topic) in clocks.iter().zip(topics) {
+    for (clock, topic) in clocks.iter().zip(topics).take(if truth.is_some() { 2 } else { 1 }) {
         if *clock == Clock::Receipt {
             warnings.push(format!(
                 "topic {topic}: no header stamps; the times of receipt are used, which are late and irregular"
@@ -298,10 +263,12 @@ fn assemble(
     path: &Path,
     options: &Options,
     warnings: &mut Vec<String>,
-) -> Result<Dataset, RosBagError> {
+) -> Result<(Dataset, Vec<RunSpan>), RosBagError> {
     let may_restart = options.cut_s.is_some();
     let wheel_rows = both.wheels.in_order(clocks[0], may_restart, warnings)?;
-    let truth_rows = both.truth.in_order(clocks[1], may_restart, warnings)?;
+    let (no_poses, has_poses) = (Rows::new("", ""), both.truth.is_some());
+    let poses = both.truth.as_ref().unwrap_or(&no_poses);
+    let truth_rows = poses.in_order(clocks[1], may_restart, warnings)?;
     let mut wheels: Vec<[f64; 2]> = wheel_rows.iter().map(|(row, _)| both.wheels.values[*row]).collect();
     if both.quantity == WheelQuantity::Ticks {
         refuse_fractions(&both.wheels, &wheels)?;
@@ -309,24 +276,24 @@ fn assemble(
     if both.quantity == WheelQuantity::Angles && unwrap_angles(&mut wheels) {
         warnings.push(format!("topic {}: the angles are wrapped to a turn; whole turns were added", both.wheels.topic));
     }
-    let has_heading = !is_heading_constant(&both.truth.values);
+    let has_heading = !is_heading_constant(&poses.values);
     if !has_heading {
         warnings.push(format!(
             "topic {}: all headings are the same while the positions are not; they were left out",
-            both.truth.topic
+            poses.topic
         ));
     }
-    let tilt_rad = both.truth.values.iter().map(|reading| reading.tilt_rad).fold(0.0, f64::max);
+    let tilt_rad = poses.values.iter().map(|reading| reading.tilt_rad).fold(0.0, f64::max);
     if tilt_rad > MAX_TILT_RAD {
         warnings.push(format!(
             "topic {}: poses are tilted by up to {:.0}°; is z up, and are they the robot's?",
-            both.truth.topic,
+            poses.topic,
             tilt_rad.to_degrees()
         ));
     }
 
-    let doubt = truth::doubt_of_covariances(&both.truth.values);
-    warnings.extend(doubt.map(|doubt| format!("topic {}: {doubt}", both.truth.topic)));
+    let doubt = truth::doubt_of_covariances(&poses.values);
+    warnings.extend(doubt.map(|doubt| format!("topic {}: {doubt}", poses.topic)));
 
     let step_s = |from: usize, to: usize| seconds(wheel_rows[from].1, wheel_rows[to].1);
     let stands = |from: usize, to: usize| {
@@ -338,7 +305,7 @@ fn assemble(
     };
     let session = wheel_rows.first().map_or(0, |(_, time_ns)| *time_ns);
     let is_cut = options.cut_s.is_some();
-    let mut runs: Vec<Run> = Vec::new();
+    let (mut runs, mut spans): (Vec<Run>, Vec<RunSpan>) = (Vec::new(), Vec::new());
     let mut seen = BTreeSet::new();
     for piece in pieces {
         let rows = &wheel_rows[piece.clone()];
@@ -347,7 +314,7 @@ fn assemble(
         let log = wheel_log(&wheels[piece], both.quantity, geometry, options.rates.unwrap_or(Rates::IntervalEnd));
         let receipt = |row: usize| both.wheels.times[row].received_ns;
         let belongs = |(row, time_ns): &&(usize, i64)| {
-            let received_ns = both.truth.times[*row].received_ns;
+            let received_ns = poses.times[*row].received_ns;
             (from_ns..=to_ns).contains(time_ns)
                 && seconds(receipt(first), received_ns) >= -RECEIPT_MARGIN_S
                 && seconds(receipt(last), received_ns) <= RECEIPT_MARGIN_S
@@ -360,12 +327,12 @@ fn assemble(
                 of_run.push(row);
             }
         }
-        if is_cut && of_run.len() < 2 {
+        if is_cut && has_poses && options.scan.is_none() && of_run.len() < 2 {
             continue;
         }
-        let readings = || of_run.iter().map(|(row, _)| &both.truth.values[*row]);
+        let readings = || of_run.iter().map(|(row, _)| &poses.values[*row]);
         let sample = |(row, time_ns): &&(usize, i64)| {
-            let reading = &both.truth.values[*row];
+            let reading = &poses.values[*row];
             let theta_rad = reading.theta_rad.filter(|_| has_heading);
             TruthSample::new(seconds(from_ns, *time_ns), reading.x_m, reading.y_m, theta_rad)
         };
@@ -378,6 +345,7 @@ fn assemble(
         let rates = gyro.as_mut().and_then(|gyro| gyro.of_run(&rows_ns, (receipt(first), receipt(last))));
         let extra = rates.map(|rates| (ExtraChannel::GyroYawRate, rates)).into_iter().collect();
         let odometry = Odometry { t_s, wheels: log, extra };
+        spans.push(RunSpan { clock_ns: (from_ns, to_ns), received_ns: (receipt(first), receipt(last)) });
         runs.push(Run { info, odometry, truth, truth_sigma, ..Run::default() });
     }
     if let Some(cut_s) = options.cut_s.filter(|_| runs.is_empty()) {
@@ -388,7 +356,7 @@ fn assemble(
     if outside > 0 {
         let what =
             if is_cut { "outside of the runs" } else { "before the first or after the last message of the wheels" };
-        warnings.push(format!("topic {}: {outside} of {} poses are {what}", both.truth.topic, truth_rows.len()));
+        warnings.push(format!("topic {}: {outside} of {} poses are {what}", poses.topic, truth_rows.len()));
     }
     if both.quantity.is_rate() && !is_cut {
         let longest_s = (1..wheel_rows.len()).map(|row| step_s(row - 1, row)).fold(0.0, f64::max);
@@ -402,18 +370,19 @@ fn assemble(
     let has_rates = runs.iter().any(|run| !run.odometry.extra.is_empty());
     let rates =
         both.gyro.as_ref().filter(|_| has_rates).map(|gyro| format!(", yaw rates of {} ({IMU})", gyro.rows.topic));
+    let of_poses = both.truth.as_ref().map(|poses| format!(", poses of {} ({})", poses.topic, poses.type_name));
     let notes = format!(
-        "ROS 2 bag: wheels of {} ({}), poses of {} ({}){}",
+        "ROS 2 bag: wheels of {} ({}){}{}",
         both.wheels.topic,
         both.wheels.type_name,
-        both.truth.topic,
-        both.truth.type_name,
+        of_poses.unwrap_or_default(),
         rates.unwrap_or_default()
     );
     let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
     let recorded = recorded(both.wheels.times.iter().map(|times| times.received_ns));
     let provenance = Provenance { name, notes: Some(notes), recorded, ..Provenance::default() };
-    Ok(Dataset { provenance, robot, truth_noise: TruthNoise::default(), points: Vec::new(), runs })
+    let truth_noise = TruthNoise::default();
+    Ok((Dataset { provenance, robot, truth_noise, points: Vec::new(), runs }, spans))
 }
 
 fn refuse_fractions(rows: &WheelRows, wheels: &[[f64; 2]]) -> Result<(), RosBagError> {

@@ -14,7 +14,7 @@ use crate::settings::MAX_DEFINITION_BYTES;
 const HEADER: &str = "std_msgs/Header header\n";
 
 /// Fields of usual types.
-const USUAL: [(&str, &[&str]); 33] = [
+const USUAL: [(&str, &[&str]); 34] = [
     ("builtin_interfaces/Time", &["int32 sec\nuint32 nanosec\n"]),
     ("std_msgs/Header", &["builtin_interfaces/Time stamp\nstring frame_id\n"]),
     ("std_msgs/Int16", &["int16 data\n"]),
@@ -58,6 +58,14 @@ const USUAL: [(&str, &[&str]); 33] = [
             "geometry_msgs/Quaternion orientation\nfloat64[9] orientation_covariance\n",
             "geometry_msgs/Vector3 angular_velocity\nfloat64[9] angular_velocity_covariance\n",
             "geometry_msgs/Vector3 linear_acceleration\nfloat64[9] linear_acceleration_covariance\n",
+        ],
+    ),
+    (
+        "sensor_msgs/LaserScan",
+        &[
+            HEADER,
+            "float32 angle_min\nfloat32 angle_max\nfloat32 angle_increment\nfloat32 time_increment\n",
+            "float32 scan_time\nfloat32 range_min\nfloat32 range_max\nfloat32[] ranges\nfloat32[] intensities\n",
         ],
     ),
     ("control_msgs/InterfaceValue", &["string[] interface_names\nfloat64[] values\n"]),

@@ -4,7 +4,9 @@
 //! `decompress`, `resync`), with the feature `db3` `sqlite_file` → `definition` (`known_types`) and `cdr`
 //! messages (`value`) → `topics` what the bag holds → `choice` which two topics → `rows` of them by `wheels`
 //! (`wheel_pair` where each has its topic), `truth` and `gyro` → `clock` their times → `gyro_column` →
-//! `import` the dataset (`recorded` when). Every limit stands in `settings`. `listing` shows the topics.
+//! `import` the dataset (`recorded` when, `took` of what). Scans of a lidar (`laser_scan`) become walls in a
+//! second pass, `scan_walls`: `wall_line` finds them, `wall_tracks` follows them by the `nominal_path`,
+//! `static_frames` says where the lidar stands. Every limit stands in `settings`. `listing` shows the topics.
 //! `recorder` writes a dataset's runs as a bag, of `messages` by `cdr_writer`.
 
 mod bag;
@@ -19,29 +21,37 @@ mod gyro;
 mod gyro_column;
 mod import;
 mod known_types;
+mod laser_scan;
 mod listing;
 mod mcap_file;
 mod messages;
+mod nominal_path;
 mod record_fields;
 mod recorded;
 mod recorder;
 mod resync;
 mod rows;
+mod scan_walls;
 mod settings;
 #[cfg(feature = "db3")]
 mod sqlite_file;
+mod static_frames;
+mod took;
 mod topics;
 mod truth;
 mod value;
+mod wall_line;
+mod wall_tracks;
 mod wheel_pair;
 mod wheels;
 mod yaml_size;
 
 pub use error::RosBagError;
-pub use import::{FromBag, Options, Took, TookTopic, import};
+pub use import::{FromBag, Options, import};
 pub use listing::{ListedTopic, Listing, list};
 pub use recorder::{
     BODY_FRAME, FIRST_STAMP_S, GYRO_FRAME, RUN_GAP_S, RecordedGyro, RecordedPath, RecordedRun, RecordedTopic,
     RecordedWheels, Recorder, TRUTH_FRAME, WORLD_FRAME,
 };
+pub use took::{Took, TookTopic};
 pub use wheels::{WheelFields, WheelQuantity};

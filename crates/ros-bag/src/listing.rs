@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use crate::bag::Bag;
-use crate::choice::{gyro_rank, suggested, truth_rank, wheels_rank};
+use crate::choice::{gyro_rank, scan_rank, suggested, truth_rank, wheels_rank};
 use crate::error::RosBagError;
 use crate::topics::{Survey, Topic};
 use crate::wheel_pair::COUNT_TYPES;
@@ -25,7 +25,7 @@ pub struct ListedTopic {
     pub rate_hz: Option<f64>,
     /// From the first to the last message, seconds.
     pub span_s: f64,
-    /// `wheels`, `truth` or `gyro`, where it may be one of them.
+    /// `wheels`, `truth`, `gyro` or `scan`, where it may be one of them.
     pub may_be: Option<&'static str>,
     /// Names of its joints.
     pub joints: Vec<String>,
@@ -46,6 +46,8 @@ pub struct Listing {
     pub truth: Option<String>,
     /// The most plausible topic of a gyroscope.
     pub gyro: Option<String>,
+    /// The first topic of scans of a lidar.
+    pub scan: Option<String>,
     /// Flags that these topics need besides.
     pub flags: Vec<String>,
     /// Whether the wheels are counted, so that the counts of a turn are needed.
@@ -89,6 +91,7 @@ pub fn list(path: &Path, definitions: &[PathBuf]) -> Result<Listing, RosBagError
             .or_else(|| pair.map(|(left, right)| format!("{},{}", left.name, right.name))),
         truth: truth.map(|topic| topic.name.clone()),
         gyro: suggested(&survey, gyro_rank).map(|topic| topic.name.clone()),
+        scan: suggested(&survey, scan_rank).map(|topic| topic.name.clone()),
         flags,
         topics: survey.topics.values().map(listed).collect(),
         warnings: survey.losses,
@@ -132,7 +135,12 @@ fn transform_of_instrument(topic: &Topic) -> Option<(&Topic, [&str; 2])> {
 fn listed(topic: &Topic) -> ListedTopic {
     let span_s = topic.span_s();
     let rate_hz = (topic.count > 1 && span_s > 0.0).then(|| (topic.count - 1) as f64 / span_s);
-    let ranks = [("wheels", wheels_rank(topic)), ("truth", truth_rank(topic)), ("gyro", gyro_rank(topic))];
+    let ranks = [
+        ("wheels", wheels_rank(topic)),
+        ("truth", truth_rank(topic)),
+        ("gyro", gyro_rank(topic)),
+        ("scan", scan_rank(topic)),
+    ];
     let may_be = ranks.into_iter().find(|(_, rank)| rank.is_some()).map(|(what, _)| what);
     ListedTopic {
         topic: topic.name.clone(),

@@ -1,5 +1,7 @@
 //! Rows of the two topics: one pass over the bag.
 
+use std::collections::BTreeMap;
+
 use crate::bag::Bag;
 use crate::cdr;
 use crate::clock::{self, Clock, Ordered, Times};
@@ -7,7 +9,8 @@ use crate::definition::Definitions;
 use crate::error::RosBagError;
 use crate::gyro::{self, GyroReading};
 use crate::mcap_file::Channel;
-use crate::topics::definitions;
+use crate::static_frames::{self, StaticFrames};
+use crate::topics::{TRANSFORMS, definitions};
 use crate::truth::{TruthReader, TruthReading};
 use crate::value::Value;
 use crate::wheel_pair::{self, Resampling, WheelPair};
@@ -35,7 +38,7 @@ pub(crate) struct Rows<T> {
 }
 
 impl<T> Rows<T> {
-    fn new(topic: &str, type_name: &str) -> Self {
+    pub(crate) fn new(topic: &str, type_name: &str) -> Self {
         Self {
             topic: topic.to_owned(),
             type_name: type_name.to_owned(),
@@ -50,7 +53,7 @@ impl<T> Rows<T> {
         }
     }
 
-    fn push(&mut self, times: Times, value: T, is_finite: bool) {
+    pub(crate) fn push(&mut self, times: Times, value: T, is_finite: bool) {
         if is_finite {
             self.times.push(times);
             self.values.push(value);
@@ -60,7 +63,7 @@ impl<T> Rows<T> {
     }
 
     /// Decodes a message; none of one that is faulty.
-    fn decode(&mut self, channel: &Channel, message: &[u8]) -> Result<Option<Value>, RosBagError> {
+    pub(crate) fn decode(&mut self, channel: &Channel, message: &[u8]) -> Result<Option<Value>, RosBagError> {
         self.messages += 1;
         if self.decoder.is_none() {
             self.decoder = Some(definitions(channel)?);
@@ -69,10 +72,15 @@ impl<T> Rows<T> {
         Ok(decoded.and_then(|decoded| decoded.map_err(|why| self.note_fault(why)).ok()))
     }
 
-    fn note_fault(&mut self, why: String) {
+    pub(crate) fn note_fault(&mut self, why: String) {
         self.faulty += 1;
         let number = self.messages;
         self.first_fault.get_or_insert((number, why));
+    }
+
+    /// Rows that were taken.
+    pub(crate) const fn len(&self) -> usize {
+        self.values.len()
     }
 
     /// Refuses a topic of which nothing could be read.
@@ -129,8 +137,11 @@ pub(crate) type WheelRows = Rows<[f64; 2]>;
 pub(crate) struct BothRows {
     pub(crate) wheels: WheelRows,
     pub(crate) quantity: WheelQuantity,
-    pub(crate) truth: Rows<TruthReading>,
+    /// None where walls are what was measured.
+    pub(crate) truth: Option<Rows<TruthReading>>,
     pub(crate) gyro: Option<GyroRows>,
+    /// The transforms of `/tf_static`.
+    pub(crate) frames: StaticFrames,
     pub(crate) losses: Vec<String>,
 }
 
@@ -144,7 +155,7 @@ pub(crate) struct GyroRows {
 /// The topics beside the wheels.
 #[derive(Clone, Copy)]
 pub(crate) struct Others<'a> {
-    pub(crate) truth: (&'a str, &'a TruthReader),
+    pub(crate) truth: Option<(&'a str, &'a TruthReader)>,
     pub(crate) gyro: Option<&'a str>,
 }
 
@@ -171,7 +182,7 @@ fn read_one(
 ) -> Result<BothRows, RosBagError> {
     let mut wheels: WheelRows = Rows::new(wheel_topic, "");
     let mut quantity = None;
-    let Visited { truth, gyro, losses } = visit(bag, others, |channel, received_ns, message| {
+    let Visited { truth, gyro, frames, losses } = visit(bag, others, |channel, received_ns, message| {
         if channel.topic == wheel_topic {
             wheels.type_name.clone_from(&channel.type_name);
             if let Some(value) = wheels.decode(channel, message)? {
@@ -188,15 +199,15 @@ fn read_one(
         Ok(())
     })?;
     wheels.refuse_none("both wheels")?;
-    truth.refuse_none("a pose")?;
+    truth.as_ref().map_or(Ok(()), |truth| truth.refuse_none("a pose"))?;
     let quantity = quantity.unwrap_or(WheelQuantity::Angles);
-    Ok(BothRows { wheels, quantity, truth, gyro, losses })
+    Ok(BothRows { wheels, quantity, truth, gyro, frames, losses })
 }
 
 fn read_two(bag: &Bag, pair: &WheelPair, resampling: Resampling, others: Others<'_>) -> Result<BothRows, RosBagError> {
     let sides = [&pair.left, &pair.right];
     let mut rows: [Rows<f64>; 2] = sides.map(|side| Rows::new(&side.topic, &side.type_name));
-    let Visited { truth, gyro, mut losses } = visit(bag, others, |channel, received_ns, message| {
+    let Visited { truth, gyro, frames, mut losses } = visit(bag, others, |channel, received_ns, message| {
         for (side, rows) in sides.iter().zip(&mut rows) {
             if channel.topic != side.topic {
                 continue;
@@ -217,7 +228,7 @@ fn read_two(bag: &Bag, pair: &WheelPair, resampling: Resampling, others: Others<
         rows.refuse_none("the wheel's number")?;
         losses.extend(rows.warnings());
     }
-    truth.refuse_none("a pose")?;
+    truth.as_ref().map_or(Ok(()), |truth| truth.refuse_none("a pose"))?;
     let [left, right] = &rows;
     let paired = wheel_pair::pair(pair, (&left.times, &left.values), (&right.times, &right.values), resampling)?;
     if paired.left_out > 0 {
@@ -231,24 +242,26 @@ fn read_two(bag: &Bag, pair: &WheelPair, resampling: Resampling, others: Others<
     }
     let mut wheels: WheelRows = Rows::new(&pair.topics(), &left.type_name);
     (wheels.times, wheels.values) = (paired.times, paired.values);
-    Ok(BothRows { wheels, quantity: pair.quantity, truth, gyro, losses })
+    Ok(BothRows { wheels, quantity: pair.quantity, truth, gyro, frames, losses })
 }
 
 /// What is beside the wheels, and what was lost.
 struct Visited {
-    truth: Rows<TruthReading>,
+    truth: Option<Rows<TruthReading>>,
     gyro: Option<GyroRows>,
+    frames: StaticFrames,
     losses: Vec<String>,
 }
 
 /// One pass over the bag: poses and gyroscope, and every message to `wheels` too.
 fn visit(
     bag: &Bag,
-    Others { truth: (truth_topic, truth_reader), gyro }: Others<'_>,
+    Others { truth, gyro }: Others<'_>,
     mut wheels: impl FnMut(&Channel, u64, &[u8]) -> Result<(), RosBagError>,
 ) -> Result<Visited, RosBagError> {
     let mut gyro = gyro.map(|topic| GyroRows { rows: Rows::new(topic, ""), frame: String::new() });
-    let mut truth: Rows<TruthReading> = Rows::new(truth_topic, "");
+    let mut truth = truth.map(|(topic, reader)| (Rows::new(topic, ""), reader));
+    let (mut frames, mut of_frames) = (StaticFrames::default(), BTreeMap::new());
     let losses = bag.visit(|channel, received_ns, message| {
         wheels(channel, received_ns, message)?;
         if let Some(GyroRows { rows, frame }) = gyro.as_mut().filter(|gyro| gyro.rows.topic == channel.topic) {
@@ -266,7 +279,14 @@ fn visit(
                 }
             }
         }
-        if channel.topic == truth_topic {
+        if static_frames::is_static(&channel.topic) && channel.type_name == TRANSFORMS {
+            let rows: &mut Rows<()> = of_frames.entry(channel.topic.clone()).or_insert_with(|| Rows::new("", ""));
+            // A transform that cannot be read leaves the place of a sensor open.
+            if let Ok(Some(value)) = rows.decode(channel, message) {
+                frames.take(&value);
+            }
+        }
+        if let Some((truth, truth_reader)) = truth.as_mut().filter(|(truth, _)| truth.topic == channel.topic) {
             truth.type_name.clone_from(&channel.type_name);
             if let Some(value) = truth.decode(channel, message)? {
                 match truth_reader.read(&value) {
@@ -282,5 +302,5 @@ fn visit(
         }
         Ok(())
     })?;
-    Ok(Visited { truth, gyro, losses: losses.lines() })
+    Ok(Visited { truth: truth.map(|(rows, _)| rows), gyro, frames, losses: losses.lines() })
 }

@@ -247,6 +247,31 @@ mod tests {
     }
 
     #[test]
+    fn covariances_of_a_filter_are_known_up_to_one_factor_where_it_states_some() {
+        let run = |truth_sigma| dataset::Run { truth_sigma, ..dataset::Run::default() };
+        let mut log = Dataset {
+            provenance: dataset::Provenance::default(),
+            robot: dataset::NominalRobot {
+                left_wheel_diameter_m: 0.1,
+                right_wheel_diameter_m: 0.1,
+                wheel_separation_m: 0.3,
+                ticks_per_rev: None,
+                counter_bits: None,
+            },
+            truth_noise: dataset::TruthNoise::default(),
+            points: Vec::new(),
+            runs: vec![run(None)],
+        };
+        assert_eq!(scale_covariances(&mut log, "/amcl_pose"), None);
+        assert_eq!(log.truth_noise.covariance_scale, CovarianceScale::Separate);
+        // One run of several is enough.
+        log.runs.push(run(Some(vec![TruthSigma { sigma_xy_m: Some(0.1), ..TruthSigma::UNKNOWN }])));
+        let said = scale_covariances(&mut log, "/amcl_pose").expect("stated");
+        assert!(said.contains("topic /amcl_pose") && said.contains("covariance_scale = \"common\""), "{said}");
+        assert_eq!(log.truth_noise.covariance_scale, CovarianceScale::Common);
+    }
+
+    #[test]
     fn covariances_are_kept_where_standard_deviations_do_not_tell_them() {
         let reading = |elements: [f64; 6]| {
             let (precision, impossible) = precision(elements);

@@ -13,7 +13,8 @@
 
 use dataset::{Blocks, DatasetError, Session, Warning};
 use estimation::{
-    Column, FitSettings, Grouping, LargeFit, Model, ModelFit, NoiseComponent, OneStepError, Records, fit_large,
+    Column, FitSettings, Grouping, LargeFit, Model, ModelFit, NoiseComponent, OneStepError, PartialOutliers, Records,
+    fit_large,
 };
 use kinematics::Pose;
 use motion_programs::Schedule;
@@ -162,7 +163,7 @@ fn not_observable(fit: &ModelFit<'_>) -> Vec<NotObservable> {
         .flat_map(|direction| {
             let direction = Vector3::new(direction[0], direction[1], direction[2]);
             let (parameter, why) = unobservable(&direction);
-            let why = why_not(&fit.records, &direction).unwrap_or(why);
+            let why = why_not(fit, &direction).unwrap_or(why);
             // Both wheels alike, or against each other: neither diameter is known.
             let of = direction.normalize().abs();
             let wheels = [Parameter::LeftWheelDiameter, Parameter::RightWheelDiameter];
@@ -174,7 +175,8 @@ fn not_observable(fit: &ModelFit<'_>) -> Vec<NotObservable> {
 }
 
 /// Why a direction is not observable where partial measurements are all there is.
-fn why_not(records: &Records<'_>, direction: &Vector3<f64>) -> Option<&'static str> {
+fn why_not(fit: &ModelFit<'_>, direction: &Vector3<f64>) -> Option<&'static str> {
+    let records: &Records<'_> = &fit.records;
     if !records.is_partial() {
         return None;
     }
@@ -189,12 +191,15 @@ fn why_not(records: &Records<'_>, direction: &Vector3<f64>) -> Option<&'static s
         "the gyro's bias is not told from the wheels' ratio: stand still for 10 s in every run, or drive at two speeds"
     } else if ratio > MIN_NAMED_COMPONENT {
         "nothing measures how straights bend: log a gyro, or headings along a wall (wall.csv)"
+    } else if fit.unobservable.iter().all(|direction| direction[2] == 0.0) {
+        "nothing measures a length: the wheelbase holds for wheels as stated, with which the robot turns as it was \
+         seen to; measure a straight by tape (distance.csv), or distances from a wall while driving (wall.csv)"
     } else {
         "nothing measures a length: measure a straight by tape (distance.csv), or distances from a wall (wall.csv)"
     })
 }
 
-/// Runs without use and runs of which no measurement fitted.
+/// Runs without use, runs of which no measurement fitted, and partial measurements that are outliers.
 fn rejected(fit: &ModelFit<'_>) -> Vec<Rejected> {
     let id = |run: (usize, usize)| fit.records.ids[run.0][run.1].clone();
     let unused = fit.records.unused.iter().map(|run| Rejected {
@@ -205,7 +210,12 @@ fn rejected(fit: &ModelFit<'_>) -> Vec<Rejected> {
         run: id(run.run),
         why: "what the instrument measured lies far outside of what wheels and noise explain".to_owned(),
     });
-    unused.chain(far).collect()
+    let partial = fit.partial_outliers().into_iter().map(|PartialOutliers { run, rejected, of }| {
+        let kinds: Vec<String> = rejected.iter().map(|(kind, count)| format!("{count} {kind}")).collect();
+        let why = format!("of its {of} partial measurements as outliers: {}; the others count", kinds.join(", "));
+        Rejected { run: id(run), why }
+    });
+    unused.chain(far).chain(partial).collect()
 }
 
 /// The instruments of groups, by the sessions' names.

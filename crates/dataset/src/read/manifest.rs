@@ -15,7 +15,7 @@ use crate::counter;
 use crate::error::{DatasetError, shown};
 use crate::identity::{parse_recorded, parse_robot_id};
 use crate::map_distortion::MapDistortion;
-use crate::partial::GyroNoise;
+use crate::partial::{GyroNoise, LidarExtrinsics};
 use crate::record::{CovarianceScale, MarkedPoint, NominalRobot, Protocol, Provenance, RunInfo, TruthNoise};
 use crate::settings::MANIFEST_LIMIT_BYTES;
 use crate::table::open_file;
@@ -50,6 +50,7 @@ struct ManifestToml {
     truth: TruthToml,
     #[serde(default)]
     gyro: GyroToml,
+    lidar: Option<LidarToml>,
     corrections: Option<Spanned<Corrections>>,
     #[serde(default)]
     run: Vec<Spanned<RunToml>>,
@@ -88,6 +89,12 @@ struct GyroToml {
     noise_rad_per_sqrt_s: Option<Spanned<f64>>,
     bias_walk_radps_per_sqrt_s: Option<Spanned<f64>>,
     sampling: Option<GyroSampling>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LidarToml {
+    yaw_rad: Option<Spanned<f64>>,
 }
 
 /// What the rate of a row is.
@@ -186,7 +193,12 @@ impl Source<'_> {
         let robot_id = robot_id.transpose()?;
         let recorded = toml.recorded.map(|recorded| self.recorded(&recorded)).transpose()?;
         let robot = self.robot(robot_toml)?;
+        let of_lidar = |LidarToml { yaw_rad }| {
+            let yaw_rad = yaw_rad.map(|yaw_rad| self.finite("yaw_rad", &yaw_rad)).transpose()?;
+            Ok::<_, DatasetError>(LidarExtrinsics { yaw_rad })
+        };
         let truth_noise = TruthNoise {
+            lidar: toml.lidar.map(of_lidar).transpose()?,
             covariance_scale: toml.truth.covariance_scale,
             map: self.map_distortion(&toml.truth)?,
             sigma_xy_m: self.sigma("sigma_xy_m", toml.truth.sigma_xy_m)?,

@@ -93,6 +93,7 @@ fn check_robot(dataset: &Dataset) -> Check {
     sigma("scale_sigma", gyro.scale_sigma)?;
     sigma("noise_rad_per_sqrt_s", gyro.noise_rad_per_sqrt_s)?;
     sigma("bias_walk_radps_per_sqrt_s", gyro.bias_walk_radps_per_sqrt_s)?;
+    dataset.truth_noise.lidar.and_then(|lidar| lidar.yaw_rad).map_or(Ok(()), |yaw_rad| finite("yaw_rad", yaw_rad))?;
     dataset.provenance.robot_id.as_deref().map_or(Ok(()), |id| parse_robot_id(id).map(|_| ()))?;
     let mut ids = BTreeSet::new();
     for point in &dataset.points {

@@ -25,6 +25,8 @@ struct ManifestOut<'a> {
     truth: TruthOut,
     #[serde(skip_serializing_if = "GyroOut::is_empty")]
     gyro: GyroOut,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    lidar: Option<LidarOut>,
     run: Vec<RunOut<'a>>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     point: Vec<PointOut<'a>>,
@@ -85,6 +87,12 @@ impl GyroOut {
 }
 
 #[derive(Serialize)]
+struct LidarOut {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    yaw_rad: Option<f64>,
+}
+
+#[derive(Serialize)]
 struct RunOut<'a> {
     id: &'a str,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -136,6 +144,7 @@ pub(crate) fn to_toml(dataset: &Dataset, runs: &[RunInfo]) -> Result<String, tom
             covariance_scale: dataset.truth_noise.covariance_scale,
         },
         gyro: GyroOut::of(dataset.truth_noise.gyro),
+        lidar: dataset.truth_noise.lidar.map(|lidar| LidarOut { yaw_rad: lidar.yaw_rad }),
         run: runs.iter().map(RunOut::new).collect(),
         point: dataset
             .points

@@ -221,7 +221,10 @@ fn may_write(target: &Path, existing: Existing) -> Result<bool, DatasetError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::{NominalRobot, Odometry, Provenance, RunInfo, TruthNoise, TruthSample, WheelLog};
+    use crate::partial::LidarExtrinsics;
+    use crate::record::{
+        CovarianceScale, NominalRobot, Odometry, Provenance, RunInfo, TruthNoise, TruthSample, WheelLog,
+    };
     use kinematics::Wheels;
 
     fn dataset(name: &str) -> Dataset {
@@ -304,6 +307,44 @@ mod tests {
         fs::write(&file, "x").expect("written");
         let refused = write(&dataset("one"), &file, Existing::ReplaceDataset).expect_err("a file");
         assert!(refused.to_string().contains("is not a folder"), "{refused}");
+    }
+
+    #[test]
+    fn the_scale_of_covariances_and_the_lidar_come_back_as_they_were_written() {
+        let temp = tempfile::tempdir().expect("a temporary folder");
+        let unknown = LidarExtrinsics::default();
+        let turned = LidarExtrinsics { yaw_rad: Some(-1.25) };
+        let cases = [
+            (CovarianceScale::Separate, None, [false; 3]),
+            (CovarianceScale::Common, Some(unknown), [true, true, false]),
+            (CovarianceScale::Common, Some(turned), [true; 3]),
+        ];
+        for (number, (covariance_scale, lidar, stands)) in cases.into_iter().enumerate() {
+            let mut one = dataset("one");
+            one.truth_noise = TruthNoise { covariance_scale, lidar, ..TruthNoise::default() };
+            let dir = temp.path().join(number.to_string());
+            write(&one, &dir, Existing::Refuse).expect("written");
+            let text = fs::read_to_string(dir.join(MANIFEST)).expect("a manifest");
+            let words = ["covariance_scale = \"common\"", "[lidar]", "yaw_rad = -1.25"];
+            assert_eq!(words.map(|word| text.contains(word)), stands, "{text}");
+            assert_eq!(crate::read(&dir).expect("readable").dataset, one);
+        }
+        // Said in words, and refused with its line where it is another.
+        let file = temp.path().join("0").join(MANIFEST);
+        let text = fs::read_to_string(&file).expect("a manifest");
+        let line = 1 + text.lines().position(|line| line == "[truth]").expect("a table");
+        let with = |key: &str| {
+            fs::write(&file, text.replace("[truth]", &format!("[truth]\n{key}"))).expect("written");
+            crate::read(&temp.path().join("0"))
+        };
+        let found = with("covariance_scale = \"separate\"").expect("readable").dataset.truth_noise;
+        assert_eq!(found.covariance_scale, CovarianceScale::Separate);
+        let refused = with("covariance_scale = \"both\"").expect_err("no scale").to_string();
+        assert!(refused.contains(&format!("dataset.toml:{}:", line + 1)), "{refused}");
+        assert!(refused.contains("separate") && refused.contains("common"), "{refused}");
+        let mut wrong = dataset("one");
+        wrong.truth_noise.lidar = Some(LidarExtrinsics { yaw_rad: Some(f64::NAN) });
+        write(&wrong, &temp.path().join("wrong"), Existing::Refuse).expect_err("NaN");
     }
 
     #[test]

@@ -50,3 +50,16 @@ pub(crate) const START_POSITION_SIGMA_M: f64 = 10.0;
 /// The same of the heading, radians.
 /// Budgeted: as above; a heading that is not measured starts where the poses' own fit has it.
 pub(crate) const START_HEADING_SIGMA_RAD: f64 = 1.0;
+
+/// Standard deviation of a lidar's place on the robot before it is seen, metres.
+/// Budgeted: robots of any size.
+pub(crate) const LIDAR_PLACE_SIGMA_M: f64 = 10.0;
+
+/// Squared innovation of a partial measurement over its variance above which it is an outlier.
+/// Derived: χ² with one degree of freedom at 1 − 1e-5, as that of poses.
+pub(crate) const PARTIAL_OUTLIER_CHI_SQUARE: f64 = 19.5;
+
+/// Share of the separation that lies in the directions which are not determined, from which on it is open
+/// whatever the wheels are.
+/// Budgeted: near 1, where it lies in them whole; spins leave a third.
+pub(crate) const MAX_SEPARATION_SHARE: f64 = 0.9;

@@ -275,7 +275,7 @@ fn rows_without_a_rate_leave_the_others_as_they_are() {
     let turns = |dataset: &Dataset| {
         let records = Records::of(&[dataset.session()]);
         let times_s = records.partial[0].observations.iter().filter_map(|of| match of.quantity {
-            crate::partial_records::Quantity::GyroTurn { dt_s } => Some(dt_s),
+            crate::partial_observation::Quantity::GyroTurn { dt_s } => Some(dt_s),
             _ => None,
         });
         times_s.sum::<f64>()
@@ -394,7 +394,7 @@ fn the_noise_of_a_gyroscope_is_taken_from_its_standstills() {
 
 fn records_window_s(records: &Records<'_>) -> f64 {
     match records.partial[0].observations[0].quantity {
-        crate::partial_records::Quantity::GyroTurn { dt_s } => dt_s,
+        crate::partial_observation::Quantity::GyroTurn { dt_s } => dt_s,
         _ => f64::NAN,
     }
 }

@@ -147,9 +147,10 @@ fn poses_are_what_they_are_in_their_own_filter() {
     let mut score = crate::noise_score::NoiseScore::zero();
     for ((partial, propagations), own) in records.partial.iter().zip(&selections[0].partial).zip(&own.runs) {
         let taken: Vec<bool> = partial.observations.iter().map(|of| poses.takes(of, Taking::PosesAlone)).collect();
-        let propagations = (&propagations.as_ref().expect("taken")[..], &taken[..]);
-        let (found, of_run) = filter_taken(partial, propagations, &poses, (&model, &noise), &products, &mut []);
-        score.add(&of_run, 1.0);
+        let propagations = (&propagations.as_ref().expect("taken")[..], &taken[..], OutlierGate::Off);
+        let of = filter_taken(partial, propagations, &poses, (&model, &noise), &products, &mut []);
+        let found = of.equations;
+        score.add(&of.score, 1.0);
         // The start is taken as a measurement here.
         assert_eq!(found.count, own.count + 3.0);
         for column in 0..Column::GyroScale.index() {

@@ -69,13 +69,17 @@ pub(crate) fn determined(sessions: &[SessionCheck], problems: &mut Vec<Problem>)
     for session in sessions {
         add(&mut information, session, &mut distance, &mut turn);
     }
-    let sigma = sigmas(&information);
+    let mut sigma = sigmas(&information);
+    let partial = sessions.iter().flat_map(|session| &session.runs).all(RunLog::is_seen_in_part);
+    if partial && sigma[..2].iter().any(|sigma| *sigma >= DETERMINED_SIGMA) {
+        // The wheels then stay as they are stated, and the separation is the one that goes with them.
+        sigma[2] = (1.0 + information[2][2]).sqrt().recip();
+    }
     let determined: BTreeMap<&'static str, bool> =
         PARAMETERS.iter().zip(sigma).map(|(name, sigma)| (*name, sigma < DETERMINED_SIGMA)).collect();
     let missing: Vec<&'static str> = PARAMETERS.into_iter().filter(|name| !determined[name]).collect();
     let is_wrong = problems.iter().any(|problem| problem.severity == Severity::Error);
     if !missing.is_empty() && !is_wrong {
-        let partial = sessions.iter().flat_map(|session| &session.runs).all(RunLog::is_seen_in_part);
         let kind = Kind::NotDetermined { parameters: missing, turns: turn > distance, partial };
         problems.push(Problem::new(&kind, Severity::Warning, None, 0.95));
     }
