@@ -1,12 +1,12 @@
 //! When rows were read that are stamped on receipt: each is held up by a random delay, and none overtakes
 //! another.
 //!
-//! Row n of tick N is read at r = P·N + s and received at t = max(r + d, t₋₁ + w): P the beat, d an exponential
-//! delay of mean m, t₋₁ when the row before was received, and w what a row takes on the line. A row that comes
-//! by itself has the density exp(−(t − r)/m)/m; one that comes on the heels of another was ready before, with
-//! the probability 1 − exp(−(t − r)/m). s stays, but for steps of a whole beat where a row was lost or came
-//! between two ticks and its number does not say so, and a slow walk of the clock. What it was is smoothed
-//! forward and backward over a grid (Baum et al. 1970; Rabiner 1989).
+//! Row n of tick N is read at r = P·N + s and received at t = max(r + d, t₋₁ + w): P the sampling period, d
+//! an exponential delay of mean m, t₋₁ when the row before was received, and w what a row takes on the line.
+//! A row that comes by itself has the density exp(−(t − r)/m)/m; one that comes on the heels of another was
+//! ready before, with the probability 1 − exp(−(t − r)/m). s stays, but for steps of a whole beat where a row
+//! was lost or came between two ticks and its number does not say so, and a slow walk of the clock. What it
+//! was is smoothed forward and backward over a grid (Baum et al. 1970; Rabiner 1989).
 //!
 //! Where delays are many beats, single steps cannot be told; the mean over all of them is then what a line
 //! through the stamps would be, with as many rows to it as the steps let agree.
@@ -21,20 +21,20 @@ const LOST_STEPS: [f64; 2] = [1.25e-3, 3e-4];
 /// Log odds against rows that are lost or came between ticks at all.
 const LOST_COST: f64 = 8.0;
 /// Probability of a step of one beat at a row, in either direction, where none is expected.
-const LEAST_STEPS: f64 = 3e-4;
+const MIN_STEPS: f64 = 3e-4;
 /// Rows by which the share is found.
 const LOST_ROWS: usize = 3000;
 /// Probability that the clock walks by a cell at a row: a beat in 60,000 rows, root mean square of a walk.
 const WALK: f64 = 1e-3;
 /// Cells whose share of the likeliest one's probability is less are left out.
-const LEAST_SHARE: f64 = 1e-9;
+const MIN_SHARE: f64 = 1e-9;
 /// Rows whose predicted probability is less begin anew, as after a pause that is no whole number of beats.
-const LEAST_PROBABILITY: f64 = 1e-12;
-/// Beats by which a row is received before it was read at the most, in the mean: the beat is not known exactly.
+const MIN_PROBABILITY: f64 = 1e-12;
+/// Beats by which a row is received before it was read, in the mean: the beat is not known exactly.
 const EARLY: f64 = 0.05;
 /// Mean delays over which a row is sought at first, beside the ones that hold each other up.
 const FIRST_DELAYS: f64 = 12.0;
-/// Mean delays are told apart to a twentieth, and sought from one beat on in steps of twice as much at first.
+/// Mean delays are found to a twentieth, and sought from one beat on in steps of twice as much at first.
 const MEANS_PER_E: f64 = 20.0;
 const FIRST_STEP: f64 = 16.0;
 /// Rows of which the probabilities are kept at once.
@@ -73,7 +73,7 @@ struct Delays {
 
 impl Delays {
     fn of(mean: f64, lost: f64) -> Self {
-        Self { mean, later: lost.max(LEAST_STEPS), earlier: (-lost).max(LEAST_STEPS) }
+        Self { mean, later: lost.max(MIN_STEPS), earlier: (-lost).max(MIN_STEPS) }
     }
 
     /// Multiplies the shares by the probability of what came of a row, over that of a row of no delay.
@@ -121,13 +121,13 @@ impl Delays {
             let mut beam = self.step(before);
             self.weigh(rows, row, &mut beam);
             let sum: f64 = beam.shares.iter().sum();
-            if sum > LEAST_PROBABILITY {
+            if sum > MIN_PROBABILITY {
                 return (beam.trimmed(), sum.ln(), false);
             }
         }
         let beam = self.first(rows, row);
         let open = beam.shares.len() as f64;
-        (beam.trimmed(), LEAST_PROBABILITY.ln() - open.ln(), true)
+        (beam.trimmed(), MIN_PROBABILITY.ln() - open.ln(), true)
     }
 
     /// Log likelihood of all rows, and the beams before each block of them.
@@ -178,16 +178,16 @@ impl Delays {
 impl Beam {
     /// Shares that go a beat down and a beat up, walk by a cell, or stay.
     fn spread(&self, down: f64, up: f64) -> Self {
-        let reach = CELLS as usize;
-        let mut shares = vec![0.0; self.shares.len() + 2 * reach];
+        let extent = CELLS as usize;
+        let mut shares = vec![0.0; self.shares.len() + 2 * extent];
         let walk = 0.5 * WALK;
         let stay = 1.0 - down - up - WALK;
         for (k, share) in self.shares.iter().enumerate() {
             shares[k] += down * share;
-            shares[k + reach - 1] += walk * share;
-            shares[k + reach] += stay * share;
-            shares[k + reach + 1] += walk * share;
-            shares[k + 2 * reach] += up * share;
+            shares[k + extent - 1] += walk * share;
+            shares[k + extent] += stay * share;
+            shares[k + extent + 1] += walk * share;
+            shares[k + 2 * extent] += up * share;
         }
         Self { first: self.first - CELLS, shares }
     }
@@ -200,7 +200,7 @@ impl Beam {
 
     /// Without the cells at its ends that are improbable, scaled.
     fn trimmed(mut self) -> Self {
-        let least = LEAST_SHARE * self.shares.iter().copied().fold(0.0, f64::max);
+        let least = MIN_SHARE * self.shares.iter().copied().fold(0.0, f64::max);
         let counts = |share: &f64| *share > least;
         let last = self.shares.iter().rposition(counts).unwrap_or(0);
         let first = self.shares.iter().position(counts).unwrap_or(0);
@@ -322,11 +322,11 @@ mod tests {
 
     /// When rows are read, of which some are lost, and when they are received that are held up by an
     /// exponential delay of so many beats; none overtakes another.
-    fn received(rows: i64, lost: f64, delay: f64, mut due_s: impl FnMut(i64) -> f64) -> Vec<[f64; 2]> {
+    fn received(rows: i64, lost: f64, delay: f64, mut read_at: impl FnMut(i64) -> f64) -> Vec<[f64; 2]> {
         let mut draws = Draws(7);
         let (mut before_s, mut all) = (f64::NEG_INFINITY, Vec::new());
         for row in 0..rows {
-            let read_s = due_s(row);
+            let read_s = read_at(row);
             let stamp_s = (read_s - delay * PERIOD_S * draws.uniform().ln()).max(before_s + 1e-4);
             if row == 0 || draws.uniform() >= lost {
                 all.push([read_s, stamp_s]);
@@ -336,7 +336,7 @@ mod tests {
         all
     }
 
-    fn beat(row: i64) -> f64 {
+    fn due_s(row: i64) -> f64 {
         PERIOD_S * row as f64
     }
 
@@ -355,14 +355,14 @@ mod tests {
 
     #[test]
     fn delays_of_many_beats_leave_less_than_one() {
-        let (mean, sigma) = errors(&received(6000, 0.0, 10.0, beat));
+        let (mean, sigma) = errors(&received(6000, 0.0, 10.0, due_s));
         // Rejects lines through 500 rows, which leave 3 beats and a mean of 29: that of the delays.
         assert!(mean.abs() < 1.0 && sigma < 0.7, "{mean} ± {sigma}");
     }
 
     #[test]
     fn rows_that_are_lost_shift_those_behind_them() {
-        let rows = received(4000, 0.02, 0.75, beat);
+        let rows = received(4000, 0.02, 0.75, due_s);
         let (mean, sigma) = errors(&rows);
         // Rejects one beat for all rows, 2 % too long, which leaves half a beat.
         assert!(mean.abs() < 0.1 && sigma < 0.25, "{mean} ± {sigma}");
@@ -374,7 +374,7 @@ mod tests {
 
     #[test]
     fn a_beat_that_begins_anew_after_a_pause_is_the_same() {
-        let rows = received(3000, 0.0, 1.0, |row| beat(row) + if row >= 1200 { 10.0037 } else { 0.0 });
+        let rows = received(3000, 0.0, 1.0, |row| due_s(row) + if row >= 1200 { 10.0037 } else { 0.0 });
         let (mean, sigma) = errors(&rows);
         // Rejects a pause of a whole number of beats, which is 0.37 of one off on one of its sides.
         assert!(mean.abs() < 0.1 && sigma < 0.12, "{mean} ± {sigma}");
@@ -383,7 +383,7 @@ mod tests {
     #[test]
     fn rows_that_hold_up_none_are_not_received_so() {
         let mut draws = Draws(7);
-        let t_s: Vec<f64> = (0..2000).map(|row| beat(row) + 0.1 * PERIOD_S * draws.normal()).collect();
+        let t_s: Vec<f64> = (0..2000).map(|row| due_s(row) + 0.1 * PERIOD_S * draws.normal()).collect();
         assert_eq!(Received::of(&t_s), None);
     }
 }

@@ -58,7 +58,8 @@ pub struct SamplingPeriod {
     /// For each row, how late its stamp is, seconds: against the line through the rows around it; where rows
     /// hold up each other, against when it was read.
     pub late_s: Vec<f64>,
-    /// Whether rows come in bunches: they are stamped on receipt, and one that is late holds up those behind it.
+    /// Whether rows come in bunches: they are stamped on receipt, and one that is late holds up those behind
+    /// it.
     pub is_bunched: bool,
 }
 

@@ -1,5 +1,6 @@
 //! One pass over all runs: the filter of every segment, and the sums of what they say.
 
+use std::mem::{Discriminant, discriminant};
 use std::ops::Range;
 
 use kinematics::InstructionSet;
@@ -14,6 +15,7 @@ use crate::noise::Noise;
 use crate::noise_score::{NoiseScore, TimingScore};
 use crate::normal_equations::NormalEquations;
 use crate::partial_filter::{Filtered, filter_partial};
+use crate::partial_observation::Quantity;
 use crate::partial_poses::TakenPoses;
 use crate::partial_records::PartialSegment;
 use crate::pass_options::{OutlierGate, PassOptions};
@@ -230,12 +232,18 @@ fn add_partial(
 ) -> Vec<(usize, usize)> {
     let columns = Column::BASE.len() + terms.iter().map(|term| term.parameters().len()).sum::<usize>();
     let mut prior = records.gyro_scale_sigma.map(|sigma| sigma.powi(-2));
-    let filtered = |terms: &mut Vec<Box<dyn ModelTerm>>,
-                    of: (&PartialSegment<'_>, &Option<Vec<PropagationInterval>>)| {
-        Some(filter_partial(of.0, (of.1.as_ref()?, gate), poses, (model, noise), products, terms))
+    let filtered = |gate: OutlierGate| -> Vec<Option<Filtered>> {
+        let of_segment = |terms: &mut Vec<Box<dyn ModelTerm>>,
+                          of: (&PartialSegment<'_>, &Option<Vec<PropagationInterval>>)| {
+            Some(filter_partial(of.0, (of.1.as_ref()?, gate), poses, (model, noise), products, terms))
+        };
+        let segments = records.partial.par_iter().zip(&selection.partial);
+        segments.map_init(|| terms.to_vec(), of_segment).collect()
     };
-    let segments = records.partial.par_iter().zip(&selection.partial);
-    let found: Vec<_> = segments.map_init(|| terms.to_vec(), filtered).collect();
+    let mut found = filtered(gate);
+    if most_of_a_kind_are_outliers(&records.partial, &found) {
+        found = filtered(OutlierGate::Off);
+    }
     // Sums are taken in the order of the segments.
     let mut all_outliers = Vec::new();
     for (number, (partial, found)) in records.partial.iter().zip(found).enumerate() {
@@ -256,6 +264,28 @@ fn add_partial(
         }
     }
     all_outliers
+}
+
+/// Whether more than half of the partial measurements of some kind are outliers. They contradict the model
+/// then, and no gate hides it.
+fn most_of_a_kind_are_outliers(partial: &[PartialSegment<'_>], found: &[Option<Filtered>]) -> bool {
+    // How many there are of a kind, and how many of them are outliers.
+    let mut kinds: Vec<(Discriminant<Quantity>, [usize; 2])> = Vec::new();
+    let with_outliers = || partial.iter().zip(found).filter_map(|(of, found)| Some((of, &found.as_ref()?.outliers)));
+    if with_outliers().all(|(_, outliers)| outliers.is_empty()) {
+        return false;
+    }
+    for (of, outliers) in with_outliers() {
+        for (number, observation) in of.observations.iter().enumerate() {
+            let kind = discriminant(&observation.quantity);
+            let counts = [1, usize::from(outliers.contains(&number))];
+            match kinds.iter_mut().find(|(known, _)| *known == kind) {
+                Some((_, all)) => (0..2).for_each(|k| all[k] += counts[k]),
+                None => kinds.push((kind, counts)),
+            }
+        }
+    }
+    kinds.iter().any(|(_, [all, outliers])| 2 * outliers > *all)
 }
 
 /// The segments of each run, which are consecutive.

@@ -225,17 +225,17 @@ fn counted_rows<'r>(
 ) -> impl Iterator<Item = (f64, f64)> + 'r {
     let late_s2 = stamps_s.iter().zip(read_s).map(|(stamp_s, read_s)| (stamp_s - read_s).powi(2)).sum::<f64>();
     let late = (late_s2 / stamps_s.len() as f64).sqrt() / period_s;
-    let reach = RATE_ROWS.max((4.0 * late) as usize);
+    let extent = RATE_ROWS.max((4.0 * late) as usize);
     let mut sizes: Vec<f64> = counts.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
     let middle = sizes.len() / 2;
     let most = if sizes.is_empty() { 0.0 } else { MAX_COUNT_RATIO * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 };
-    (reach + 1..stamps_s.len().saturating_sub(reach)).filter_map(move |row| {
-        let (from, to) = (row - 1 - reach, row + reach);
+    (extent + 1..stamps_s.len().saturating_sub(extent)).filter_map(move |row| {
+        let (from, to) = (row - 1 - extent, row + extent);
         let rate = (counts[to] - counts[from]) / (read_s[to] - read_s[from]);
         let counted = counts[row] - counts[row - 1];
         let (on_beat, as_stamped) = (read_s[row] - read_s[row - 1], stamps_s[row] - stamps_s[row - 1]);
         let is_sound = counted.abs() <= most && rate.is_finite();
-        is_sound.then(|| (rate * (on_beat - as_stamped), counted - rate * as_stamped))
+        is_sound.then_some((rate * (on_beat - as_stamped), counted - rate * as_stamped))
     })
 }
 

@@ -1,6 +1,6 @@
 //! Walls that a lidar sees which stands anywhere on the robot, and readings that are outliers.
 
-use dataset::{Dataset, LidarExtrinsics, Run, WallReading};
+use dataset::{Dataset, LidarExtrinsics, Run, TruthSample, WallReading};
 use kinematics::Pose;
 
 use super::partial::{
@@ -97,6 +97,25 @@ fn a_reading_ten_standard_deviations_off_is_rejected_and_moves_nothing() {
         let ungated = fit.refit_ungated().expect("a fit");
         assert_eq!(ungated.partial_outliers(), []);
     }
+}
+
+#[test]
+fn tapes_that_all_contradict_poses_are_no_outliers() {
+    // Tapes that say 2 % more, twenty of their standard deviations or more, beside exact poses.
+    let beside_poses = |is_long: fn(&Run) -> bool| {
+        dataset(NO_GYRO, move |run, poses| {
+            let measured =
+                |(row, at): (usize, &Pose)| TruthSample::new(run.odometry.t_s[row], at.x_m, at.y_m, Some(at.theta_rad));
+            run.truth = poses.iter().enumerate().step_by(10).map(measured).collect();
+            tape(run, poses, [20, 120], 0.0);
+            if is_long(run) {
+                run.distances.iter_mut().for_each(|of| of.distance_m *= 1.02);
+            }
+        })
+    };
+    let rejected = |is_long| fitted(&beside_poses(is_long)).partial_outliers().len();
+    // Rejects a gate that takes all of them out: what contradicts the poses would be in no fit.
+    assert_eq!((rejected(|_| true), rejected(|run| run.info.id == "run-2")), (0, 1));
 }
 
 #[test]
