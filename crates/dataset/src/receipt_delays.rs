@@ -37,6 +37,9 @@ const FIRST_DELAYS: f64 = 12.0;
 /// Mean delays are found to a twentieth, and sought from one beat on in steps of twice as much at first.
 const MEANS_PER_E: f64 = 20.0;
 const FIRST_STEP: f64 = 16.0;
+/// Mean delays of more beats are none of single rows: a log that is written in blocks has one stamp a block.
+/// The grid grows with them.
+const MAX_MEAN: f64 = 40.0;
 /// Rows of which the probabilities are kept at once.
 const BLOCK_ROWS: usize = 1024;
 /// A row that comes in less of a beat behind another was held up by it.
@@ -76,7 +79,7 @@ impl Delays {
         Self { mean, later: lost.max(MIN_STEPS), earlier: (-lost).max(MIN_STEPS) }
     }
 
-    /// Multiplies the shares by the probability of what came of a row, over that of a row of no delay.
+    /// Multiplies the shares by the likelihood of a row's stamp.
     fn weigh(&self, rows: &Rows, row: usize, beam: &mut Beam) {
         let cell = 1.0 / CELLS as f64;
         // exp(−delay/mean) grows from cell to cell by the same factor.
@@ -255,11 +258,17 @@ impl Received {
         };
         let mean_of = |steps: f64| (steps / MEANS_PER_E).exp();
         let likeliest_mean = |first: f64, lost: f64, rows: &Rows| {
-            let log_likelihood = |steps: f64| Delays::of(mean_of(steps), lost).blocks(rows).0;
+            let log_likelihood = |steps: f64| match mean_of(steps) {
+                mean if mean > MAX_MEAN => f64::NEG_INFINITY,
+                mean => Delays::of(mean, lost).blocks(rows).0,
+            };
             mean_of(likeliest(MEANS_PER_E * first.ln(), [FIRST_STEP, 1.0], log_likelihood))
         };
         let most = LOST_ROWS.min(t_s.len());
         let mean = likeliest_mean(1.0, 0.0, &rows(0.0, most));
+        if mean * (1.0 / MEANS_PER_E).exp() > MAX_MEAN {
+            return None;
+        }
         let log_odds = |lost: f64| {
             let cost = if lost == 0.0 { 0.0 } else { LOST_COST };
             Delays::of(mean, lost).blocks(&rows(lost, most)).0 - cost
@@ -378,6 +387,13 @@ mod tests {
         let (mean, sigma) = errors(&rows);
         // Rejects a pause of a whole number of beats, which is 0.37 of one off on one of its sides.
         assert!(mean.abs() < 0.1 && sigma < 0.12, "{mean} ± {sigma}");
+    }
+
+    #[test]
+    fn rows_that_are_written_in_blocks_are_not_received_one_by_one() {
+        // 300 rows are stamped one after the other once every three seconds: delays of 150 beats on average.
+        let t_s: Vec<f64> = (0..3000).map(|row| 3.0 * f64::from(row / 300 + 1) + 1e-5 * f64::from(row % 300)).collect();
+        assert_eq!(Received::of(&t_s), None);
     }
 
     #[test]

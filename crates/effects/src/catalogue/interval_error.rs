@@ -193,19 +193,13 @@ fn share_by_counts(datasets: &[Dataset]) -> Option<(f64, f64)> {
         let stamps_s = &run.odometry.t_s;
         let Some(period) = SamplingPeriod::of(stamps_s).filter(|period| period.is_bunched) else { continue };
         let read_s: Vec<f64> = stamps_s.iter().zip(&period.late_s).map(|(stamp_s, late_s)| stamp_s - late_s).collect();
-        match &run.odometry.wheels {
-            WheelLog::Ticks(ticks) => {
-                for column in [&ticks.left, &ticks.right] {
-                    let counts: Vec<f64> = column.iter().map(|count| *count as f64).collect();
-                    rows.extend(counted_rows(stamps_s, &read_s, &counts, period.period_s));
-                }
-            }
-            WheelLog::Angles(angles) => {
-                for column in [&angles.left, &angles.right] {
-                    rows.extend(counted_rows(stamps_s, &read_s, column, period.period_s));
-                }
-            }
-            WheelLog::Speeds(_) | WheelLog::Twist { .. } => {}
+        let columns = match &run.odometry.wheels {
+            WheelLog::Ticks(ticks) => ticks.as_ref().map(|column| column.iter().map(|count| *count as f64).collect()),
+            WheelLog::Angles(angles) => angles.clone(),
+            WheelLog::Speeds(_) | WheelLog::Twist { .. } => continue,
+        };
+        for column in [&columns.left, &columns.right] {
+            rows.extend(counted_rows(stamps_s, &read_s, column, period.period_s));
         }
     }
     let (xx, xy) = rows.iter().fold((0.0, 0.0), |(xx, xy), (x, y)| (xx + x * x, xy + x * y));
@@ -215,8 +209,8 @@ fn share_by_counts(datasets: &[Dataset]) -> Option<(f64, f64)> {
     (share.is_finite() && sigma.is_finite()).then(|| (share, sigma.max(MIN_SHARE_SIGMA)))
 }
 
-/// For each row, what it would have counted more if it was read on the beat, and what it has, both over what
-/// it would have counted if it was read when it was stamped; in counts or radians.
+/// For each row, by how much its count on the beat would exceed its count at its stamp, and by how much the
+/// recorded count does; in counts or radians.
 fn counted_rows<'r>(
     stamps_s: &'r [f64],
     read_s: &'r [f64],
