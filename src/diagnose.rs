@@ -99,10 +99,11 @@ pub(crate) fn write_diagnosis(
 /// elsewhere, and those that were left out because they do not.
 fn reservations(document: &Document) -> String {
     let of = |finding: &Finding| {
-        let what = match finding.carries_over {
-            Some(true) => return None,
-            Some(false) => "is left out, as it does not carry over",
-            None => "may not carry over to other sessions and kinds of path",
+        let what = match (finding.carries_over, finding.in_extended_model) {
+            (Some(true), _) => return None,
+            (Some(false), _) => "is left out, as it does not carry over",
+            (None, Some(false)) => "is left out, as its cause is not established",
+            (None, _) => "may not carry over to other sessions and kinds of path",
         };
         finding.of_the_mean.then(|| format!("# {} {what}: {}\n", finding.names.join(" or "), finding.carries_over_why))
     };
@@ -125,9 +126,12 @@ fn show(document: &Document, terminal: &Terminal) -> Result<(), Failure> {
         for finding in &document.findings {
             terminal.say(&finding.sentence)?;
             if finding.of_the_mean && finding.carries_over != Some(false) {
-                let carries = match finding.carries_over {
-                    Some(_) => "carries over",
-                    None => "cannot be told whether it carries over",
+                let carries = match (finding.carries_over, finding.in_extended_model) {
+                    (Some(_), _) => "carries over",
+                    (None, Some(false)) => {
+                        "left out of the extended model, as its cause is not established; cannot be told whether it carries over"
+                    }
+                    (None, _) => "cannot be told whether it carries over",
                 };
                 terminal.say(&format!("  {carries}: {}", finding.carries_over_why))?;
             }

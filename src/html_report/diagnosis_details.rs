@@ -61,6 +61,9 @@ pub(super) fn carries_over(document: &Document) -> Option<Section> {
         let answer = match finding.carries_over {
             Some(true) => "Yes",
             Some(false) => "No",
+            None if finding.in_extended_model == Some(false) => {
+                "These data cannot tell, and the extended model does without it, as its cause is not established"
+            }
             None => "These data cannot tell",
         };
         section = section.text(format!("{answer}: {} ({}).", finding.carries_over_why, finding.id));

@@ -80,7 +80,7 @@ fn an_extended_model_drifts_on_fresh_runs_as_the_noise_does_and_its_geometry_alo
     }
 }
 
-/// Through the file's text and back, evaluation on the diagnosed runs is the dead reckoning of the diagnosis,
+/// Through the file's text and back, evaluation on the diagnosed runs is the dead reckoning of the model that carries over,
 /// whose first measurement is at the log's first row and whose last one is within the log: seen are 3e-15 m.
 /// A nanometre is far below what any term does. Seen to reject a held value that is lost: another width of
 /// the backlash moves an end by 1.3e-5 m.
@@ -96,9 +96,9 @@ fn evaluation_on_the_diagnosed_runs_is_the_dead_reckoning_of_the_diagnosis() {
         let dataset = simulated(&quiet_robot(id, sizes), 73);
         let sessions = [dataset.session()];
         let found = diagnose(std::slice::from_ref(&dataset), &Options::default()).expect("a diagnosis");
-        assert!(!found.found.terms().is_empty(), "{id}");
+        assert!(!found.carried.terms().is_empty(), "{id}");
         let fit = FitSettings::GEOMETRY_ONLY.fit(&sessions).expect("fits");
-        let ends = fit.dead_reckoned(&found.found.model, &mut found.found.terms());
+        let ends = fit.dead_reckoned(&found.carried.model, &mut found.carried.terms());
         let text = found.extended.expect("a scenario").to_toml().expect("has a text");
         let evaluated = runs(&dataset, &model(&Scenario::parse(&text, "extended.toml").expect("a scenario")));
         assert_eq!(ends.len(), evaluated.len(), "{id}");

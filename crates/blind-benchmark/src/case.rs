@@ -9,7 +9,7 @@ use super::conditions::Conditions;
 #[cfg(test)]
 use super::conditions::Stamps;
 use super::draw::{CaseDraws, Draw};
-use super::drive::{DriveContext, HELD_OUT_RUN, PLANNED, drive, mean_square_motion};
+use super::drive::{DriveContext, HELD_OUT_RUN, OTHER_SESSION, PLANNED, drive, mean_square_motion};
 use super::hidden::{EffectKind, Hidden, hideable};
 use super::instrument::InstrumentModel;
 use super::oracle::{Detectability, TrueNoise};
@@ -279,13 +279,7 @@ impl Case {
     /// one by all that was driven.
     pub(crate) fn drive_more(&self, plans: &[SessionPlan]) -> Result<Option<FurtherRuns>, ChallengeError> {
         let (Some(effect), Some(truth)) = (self.hidden.first(), self.truth()) else { return Ok(None) };
-        let measurement = DriveContext {
-            seed: self.seed,
-            number: self.number,
-            conditions: &self.conditions,
-            robot: &self.robot,
-            instrument_model: &self.instrument_model,
-        };
+        let measurement = self.drive_context();
         let all = |hidden: &[&Hidden]| -> Result<Vec<Dataset>, ChallengeError> {
             let mut all = drive(&self.robot.sessions, &measurement, hidden, false, 0)?;
             all.extend(drive(plans, &measurement, hidden, false, PLANNED)?);
@@ -296,6 +290,22 @@ impl Case {
         };
         let rivals = detectability.rivals(effect.id, known_noncentrality(effect, &detectability));
         Ok(Some(FurtherRuns { datasets: drive(plans, &measurement, &[effect], true, PLANNED)?, rivals }))
+    }
+
+    /// The session on other paths, without noise.
+    pub(crate) fn drive_elsewhere(&self) -> Result<Vec<Dataset>, ChallengeError> {
+        let hidden: Vec<&Hidden> = self.hidden.iter().collect();
+        drive(std::slice::from_ref(&self.robot.other), &self.drive_context(), &hidden, false, OTHER_SESSION)
+    }
+
+    fn drive_context(&self) -> DriveContext<'_> {
+        DriveContext {
+            seed: self.seed,
+            number: self.number,
+            conditions: &self.conditions,
+            robot: &self.robot,
+            instrument_model: &self.instrument_model,
+        }
     }
 
     /// The drive that a calibration should find.

@@ -22,6 +22,8 @@ use crate::error::ChallengeError;
 
 /// Where the held-out log's draws are, away from the sessions'.
 pub(crate) const HELD_OUT_RUN: u32 = 16;
+/// Where those of the session on other paths are.
+pub(crate) const OTHER_SESSION: u32 = 24;
 /// Where those of planned runs are.
 pub(crate) const PLANNED: u32 = 8;
 

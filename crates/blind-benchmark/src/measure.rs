@@ -113,9 +113,27 @@ pub(crate) fn measures_with(seed: u64, cases: &[CaseResult], bar_of_nulls: f64) 
         &of(CaseKind::LeftOut).collect::<Vec<_>>(),
         0.7,
     ));
+    measures.push(other_session(cases));
     measures.extend(large(cases));
     measures.extend(probabilities(cases));
     measures
+}
+
+/// Two-sided 95 % of a normal variable: what a gain must be below zero by to be a loss, in its standard
+/// deviations.
+const LOSS_SIGMAS: f64 = 1.96;
+
+/// Extended models that do harm where the robot drives otherwise. Those that are not extended count with
+/// nobody.
+fn other_session(cases: &[CaseResult]) -> Measure {
+    let gains: Vec<f64> = cases.iter().filter_map(|case| case.other_session).collect();
+    share(
+        "other_session",
+        "extended models that predict a session of other paths worse than the calibration alone, beyond the interval",
+        count(gains.iter(), |gain: &f64| *gain < -LOSS_SIGMAS),
+        0.03,
+        true,
+    )
 }
 
 /// What is said of large effects: the right name, and nothing beside it that the effect itself explains.

@@ -63,6 +63,10 @@ pub struct CaseResult {
     pub extended: bool,
     /// Gain in log score on the held-out log: of the tool, and of who knows the true term.
     pub gain: Option<[f64; 2]>,
+    /// Of an extended model on a session of other paths, speed and acceleration: its gain in log score over
+    /// the calibration alone, over the standard deviation that errors of measurements give the gain.
+    #[serde(default)]
+    pub other_session: Option<f64>,
     /// Where its effect was found among several names: what the planned run made of them.
     pub planned: Option<Planned>,
 }

@@ -51,6 +51,8 @@ pub(crate) struct RandomRobot {
     pub(crate) family: PathFamily,
     pub(crate) sessions: Vec<SessionPlan>,
     pub(crate) held_out: SessionPlan,
+    /// A session of other paths, speed and acceleration.
+    pub(crate) other: SessionPlan,
     /// What the runs carry in turn, kilograms; empty where the record says nothing of loads.
     pub(crate) payload_kg: Vec<f64>,
     /// Jitter of the log's stamps where the readings jitter with them, seconds.
@@ -105,7 +107,8 @@ impl RandomRobot {
         // question.
         let scenario = sessions[0].scenario.clone();
         let held_out = SessionPlan { programs: programs(family, &scenario, (HELD_OUT_S, 1), &mut paths), scenario };
-        Ok(Self { family, sessions, held_out, payload_kg, jitter_s })
+        let other = other_session(family, base, conditions, &payload_kg, &mut draws.of("other session"));
+        Ok(Self { family, sessions, held_out, other, payload_kg, jitter_s })
     }
 
     /// The robot as effects know it that are hidden in it.
@@ -130,6 +133,23 @@ impl RandomRobot {
         let others = CATALOGUE.iter().filter(|id| !hidden.contains(id));
         others.filter_map(|id| harmless(id, &host)).collect()
     }
+}
+
+/// A session of another family of paths, at a speed and an acceleration of its own; it carries each load of
+/// the robot's for some runs.
+fn other_session(
+    family: PathFamily,
+    mut scenario: Scenario,
+    conditions: &Conditions,
+    payload_kg: &[f64],
+    draw: &mut Draw,
+) -> SessionPlan {
+    let others: Vec<PathFamily> = PathFamily::ALL.into_iter().filter(|other| *other != family).collect();
+    let family = others[draw.below(others.len())];
+    scenario.robot.cruise_speed_m_s = conditions.speed_scale * draw.uniform(0.15, 0.5);
+    scenario.robot.acceleration_m_s2 = conditions.speed_scale * draw.uniform(0.3, 1.0);
+    let runs = payload_kg.len().max(2) as u32;
+    SessionPlan { programs: programs(family, &scenario, (HELD_OUT_S, runs), draw), scenario }
 }
 
 /// The robot without what is hidden; its effects are the calibration errors alone.

@@ -8,7 +8,7 @@ use kinematics::DriveGeometry;
 
 use super::case::{Case, CaseKind};
 use super::hidden::{EffectKind, kind_of};
-use super::oracle::{misfit, misfit_of_form};
+use super::oracle::{gain_of_terms, misfit, misfit_of_form};
 use super::planned::planned;
 use super::result::{CaseResult, reported};
 use super::strata::strata;
@@ -48,6 +48,7 @@ pub(crate) fn score(number: u64, case: &Case, scope: Scope) -> Result<CaseResult
         refused: None,
         extended: false,
         gain: None,
+        other_session: None,
         planned: None,
     };
     match diagnosed {
@@ -61,6 +62,7 @@ pub(crate) fn score(number: u64, case: &Case, scope: Scope) -> Result<CaseResult
                 return Ok(result);
             }
             result.gain = gain(case, Some(&diagnosis))?;
+            result.other_session = other_session(case, &diagnosis)?;
             if case.case_kind == CaseKind::Single {
                 result.planned = planned(case, &result, diagnosis.document.next_experiment.as_ref())?;
             }
@@ -99,6 +101,18 @@ fn gain(case: &Case, diagnosis: Option<&Diagnosis>) -> Result<Option<[f64; 2]>, 
         gained.min(possible)
     });
     Ok(Some([found, possible]))
+}
+
+/// What the model that is handed on gains on a session of other paths over the calibration alone, over its
+/// standard deviation. As for [`gain`], records there are sound, so that cases with other clocks tell nothing.
+fn other_session(case: &Case, diagnosis: &Diagnosis) -> Result<Option<f64>, ChallengeError> {
+    let mut terms = diagnosis.carried.terms();
+    if terms.is_empty() || case.conditions.has_clock_offset() {
+        return Ok(None);
+    }
+    let (plain, extended) = (&diagnosis.calibrated.model, &diagnosis.carried.model);
+    let gain = gain_of_terms(&case.drive_elsewhere()?, case.noise, plain, extended, &mut terms);
+    Ok(gain.map(|(gain, sigma)| gain / sigma))
 }
 
 /// What is left of the effects with a random signature, each alone, with its own term and the geometry

@@ -95,3 +95,39 @@ fn rounds_take_turns_and_leave_every_effect_out_once() {
         .collect();
     assert_eq!(places, (0..40).collect::<Vec<u64>>());
 }
+
+/// Where the model with the term leaves no residual b of a signature a, the gain is ½|a|² with a standard
+/// deviation of |a|; the other way round the term is a loss of as much. The tolerance is what models that
+/// explain 99 % of the signature leave, and the curvature of the path over sizes.
+#[test]
+fn the_gain_of_a_true_term_is_half_of_its_squared_standard_deviation() {
+    let mut asked = 0;
+    for number in 30..33 {
+        let Ok(case) = Case::draw(Scope::Whole, 11, number).expect("simulates") else { continue };
+        let ([hidden], [view]) = (&case.hidden[..], &case.oracle[..]) else { continue };
+        let explains = view.form_share.is_some_and(|share| share > 0.99) && view.ratio.is_some_and(|ratio| ratio > 2.0);
+        if hidden.kind != EffectKind::Mean || hidden.other_form || !explains || case.conditions.has_clock_offset() {
+            continue;
+        }
+        let Some(variants) = effects::hypothesis(hidden.id).and_then(effects::Hypothesis::into_variants) else {
+            continue;
+        };
+        let values = hidden.values();
+        let (truth, elsewhere) = (case.truth().expect("a drive"), case.drive_elsewhere().expect("simulates"));
+        let plain = estimation::Model::of(&truth, 0);
+        let gains = variants.into_iter().filter_map(|variant| {
+            let of = |name: &str| values.iter().find(|(own, _)| *own == name).map_or(0.0, |(_, size)| *size);
+            let extended = estimation::Model {
+                term_values: variant.term.parameters().iter().map(|parameter| of(parameter.name)).collect(),
+                ..plain.clone()
+            };
+            oracle::gain_of_terms(&elsewhere, case.noise, &plain, &extended, &mut [variant.term])
+        });
+        let Some((gain, sigma)) = gains.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(_, sigma)| *sigma > 3.0) else {
+            continue;
+        };
+        assert!((gain / (0.5 * sigma * sigma) - 1.0).abs() < 0.1, "{number}, {}: {gain} ± {sigma}", hidden.id);
+        asked += 1;
+    }
+    assert!(asked >= 2, "{asked}");
+}

@@ -15,6 +15,7 @@ use crate::check::TestResult;
 use crate::clock_offsets::clock_offsets;
 use crate::detectability::detectability;
 use crate::document::{Document, Gain};
+use crate::finding::Finding;
 use crate::findings::{StageResults, findings};
 use crate::gain::gain_by_level;
 use crate::log_rows::{check_rows, check_spans};
@@ -81,6 +82,8 @@ pub struct Diagnosis {
     pub calibrated: FittedModel,
     /// The calibrated model with what was found in its mean.
     pub found: FittedModel,
+    /// The same without what other sessions and paths are not known to have: the model that `extended` has.
+    pub carried: FittedModel,
     /// The geometry that suits these data best where none of the robot's own effects can be expressed: fitted
     /// beside what was found of the instrument alone. `None` where faults of the records were undone first.
     pub geometry_alone: Option<CalibrationReport>,
@@ -239,7 +242,7 @@ fn stages(datasets: &[Dataset], options: &Options, min_common_clock_s: f64) -> R
     begins(Step::NextExperiment);
     let next =
         next_experiment(records, (&structure.base, &structure.found), (model, &catalogue, &blind_to), &options.limits);
-    let carried = carried(&structure.base, model, &carry_over);
+    let carried = carried(&structure.base, model, &findings);
     let extended = crate::extended_scenario::scenario_of(records, &datasets[0].robot, &faults, stamps, &carried);
     begins(Step::Residuals);
     let residuals = residuals(&structure.base, model);
@@ -271,8 +274,8 @@ fn stages(datasets: &[Dataset], options: &Options, min_common_clock_s: f64) -> R
         extended_model: None,
         extended_model_why_null: extended.as_ref().err().cloned(),
     };
-    let found = FittedModel::of(model);
-    Ok(Diagnosis { document, extended, residuals, alternatives, base, calibrated, found, geometry_alone })
+    let (found, carried) = (FittedModel::of(model), FittedModel::of(&carried));
+    Ok(Diagnosis { document, extended, residuals, alternatives, base, calibrated, found, carried, geometry_alone })
 }
 
 /// The base fit, of thinned measurements where odometry seems uncorrelated with all of them: between frequent
@@ -295,10 +298,11 @@ fn gain_of(base: &ModelFit<'_>, model: &AugmentedModel<'_>, names: &[String]) ->
     }
 }
 
-/// The model without the terms that do not carry over to some session or kind of path.
-fn carried<'a>(base: &ModelFit<'a>, model: &AugmentedModel<'a>, carry_over: &[CarryOver]) -> AugmentedModel<'a> {
+/// The model without the terms that other sessions and paths are not known to have.
+fn carried<'a>(base: &ModelFit<'a>, model: &AugmentedModel<'a>, findings: &[Finding]) -> AugmentedModel<'a> {
     with_candidates(base, model, |index, _| {
-        carry_over.get(index).is_none_or(|carry_over| carry_over.carries_over != Some(false))
+        let of_term = findings.iter().find(|finding| finding.term == Some(index));
+        of_term.is_none_or(Finding::is_in_extended_model)
     })
 }
 

@@ -114,6 +114,8 @@ pub struct Finding {
     pub carries_over: Option<bool>,
     /// Why.
     pub carries_over_why: String,
+    /// Whether the extended model has it; `None` of what is no term of the mean.
+    pub in_extended_model: Option<bool>,
     /// Whether it is a term of the model's mean, which another session may have as well.
     #[serde(skip)]
     pub of_the_mean: bool,

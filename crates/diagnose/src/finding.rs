@@ -18,6 +18,7 @@ use crate::record_faults::Fault;
 use crate::residual_tests::Checked;
 use crate::rivals::Name;
 use crate::selection::SearchResult;
+use crate::settings::carry_over::MIN_ESTABLISHED_PROBABILITY;
 use crate::settings::findings::{
     LACK_OF_FIT_LEVEL, NONE_OF_CAUSES_ODDS, PART_OF_STRONGER_RATIO, PART_OF_STRONGER_RATIO_IF_FULL, UNCATALOGUED_PRIOR,
 };
@@ -79,6 +80,13 @@ impl Finding {
     /// Whether it is a mean effect that no uncatalogued cause is held to explain as well.
     pub(crate) fn is_certain(&self) -> bool {
         self.is_mean() && !self.has_unlisted()
+    }
+
+    /// Whether the extended model has its term, which acts wherever the robot drives. Beside the data that it
+    /// was found in, one of several causes, or an unknown one, is likely to predict worse than none.
+    pub(crate) fn is_in_extended_model(&self) -> bool {
+        let established = self.probability >= MIN_ESTABLISHED_PROBABILITY && !self.has_unlisted();
+        self.carry_over.as_ref().and_then(|of| of.carries_over).unwrap_or(established)
     }
 
     /// An uncatalogued cause may do the same, with so much probability relative to that of the causes here.

@@ -44,3 +44,8 @@ pub(crate) const MAX_LESS_THAN_HALF: f64 = 0.05;
 /// Probability. Level of Cochran's Q at which units are taken to differ.
 /// Convention: 10 %, as its power is low with few units (Higgins and Thompson 2002).
 pub(crate) const HETEROGENEITY_LEVEL: f64 = 0.1;
+
+/// Probability. Where no other session or kind of path was driven, a term is in the extended model whose cause
+/// is so probable.
+/// Derived: more likely than all others together.
+pub(crate) const MIN_ESTABLISHED_PROBABILITY: f64 = 0.5;
