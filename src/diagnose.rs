@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use ::diagnose::{Diagnosis, Document, Finding, GainLevel, LevelGain, OnStage, Options, Stage};
+use ::diagnose::{
+    Diagnosis, Document, Finding, GainLevel, LevelGain, NestedGain, OnStage, Options, Stage, nested_gains,
+};
 use calib::{CalibrationReport, TrainedOn};
 use clap::Args;
 use dataset::Dataset;
@@ -30,6 +32,10 @@ pub(crate) struct Arguments {
     /// Take an effect out of the catalogue; may be given several times.
     #[arg(long = "without", value_name = "ID")]
     without: Vec<String>,
+    /// Diagnose again without each session and each kind of path, and show what these models gain on it.
+    /// Costs a diagnosis for each.
+    #[arg(long)]
+    nested: bool,
     /// Write into a folder that is not empty.
     #[arg(long)]
     force: bool,
@@ -46,6 +52,13 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let diagnosis = ::diagnose::diagnose(&datasets, &options);
     bar.finish_and_clear();
     let mut diagnosis = diagnosis?;
+    if arguments.nested {
+        let options = Options { without: arguments.without.clone(), ..Options::default() };
+        diagnosis.document.nested = nested_gains(&datasets, &options)?;
+        if diagnosis.document.nested.is_empty() {
+            terminal.remark("--nested: one session and one kind of path leave nothing to be held out");
+        }
+    }
     if let Some(out) = &arguments.out {
         write_diagnosis(&mut diagnosis, &datasets, &arguments.datasets, (out, arguments.force))?;
         terminal.remark(&format!(
@@ -110,6 +123,44 @@ fn reservations(document: &Document) -> String {
     document.findings.iter().filter_map(of).collect()
 }
 
+/// What models gain whose effects were chosen without what they are measured on.
+fn show_nested(nested: &NestedGain, terminal: &Terminal) -> Result<(), Failure> {
+    let (whole, unit) = match nested.level {
+        GainLevel::Kinds => ("kinds of path", "kind of path"),
+        _ => ("sessions", "session"),
+    };
+    terminal.say(&format!(
+        "with whole {whole} left out of the diagnosis, {} in turn, {} of which leave nothing to add:",
+        nested.units, nested.abstained
+    ))?;
+    let mut rows = table(&[unit, "found by the others", "ends off, mm", "extended", "gain, 95 %"], 2);
+    for held in &nested.held_out {
+        let found = match (&held.found, &held.why_null) {
+            (Some(found), _) if found.is_empty() => "nothing".to_owned(),
+            (Some(found), _) => found.join(", "),
+            (None, why) => why.clone().unwrap_or_default(),
+        };
+        let ends = held.final_position_m.as_ref();
+        let mm = |metres: f64| 1e3 * metres;
+        let interval = ends.map(|ends| format!("{:.1} to {:.1}", mm(ends.low), mm(ends.high)));
+        rows.add_row([
+            held.unit.clone(),
+            found,
+            cell(ends.map(|ends| ends.base), 1e3, 1),
+            cell(ends.map(|ends| ends.extended), 1e3, 1),
+            interval.unwrap_or_else(|| "–".to_owned()),
+        ]);
+    }
+    terminal.say(&rows.to_string())?;
+    if let Some(drift) = &nested.drift_percent {
+        terminal.say(&format!(
+            "over all: drift {:.3} % → {:.3} % (gain {:.3} to {:.3})",
+            drift.base, drift.extended, drift.low, drift.high
+        ))?;
+    }
+    Ok(())
+}
+
 fn show(document: &Document, terminal: &Terminal) -> Result<(), Failure> {
     terminal.say(&document.sentence)?;
     if !document.findings.is_empty() {
@@ -160,6 +211,9 @@ fn show(document: &Document, terminal: &Terminal) -> Result<(), Failure> {
             "with whole {whole} held out, {units} in turn: drift {:.3} % → {:.3} % (gain {:.3} to {:.3})",
             drift.base, drift.extended, drift.low, drift.high
         ))?;
+    }
+    for nested in &document.nested {
+        show_nested(nested, terminal)?;
     }
     if let Some(next) = &document.next_experiment {
         terminal.say(&format!("next experiment (yair plan tells more): {}", next.drive))?;

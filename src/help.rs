@@ -28,7 +28,10 @@ const GROUPS: &[(&str, &[Entry])] = &[
                     "yair evaluate mine --calibration mine.toml --max-drift 0.5",
                 ],
             ),
-            ("diagnose", &["yair diagnose mine --out diagnosis", "yair diagnose monday tuesday --out diagnosis"]),
+            (
+                "diagnose",
+                &["yair diagnose mine --out diagnosis", "yair diagnose monday tuesday --nested --out diagnosis"],
+            ),
             ("plan", &["yair plan mine --room 4,3", "yair plan scenarios/motion-capture.toml --minutes 10"]),
             ("correct", &["yair correct mine --calibration diagnosis/extended.toml --out poses"]),
             ("compare", &["yair compare monday tuesday wednesday"]),

@@ -104,7 +104,7 @@ fn gain(case: &Case, diagnosis: Option<&Diagnosis>) -> Result<Option<[f64; 2]>, 
 }
 
 /// What the model that is handed on gains on a session of other paths over the calibration alone, over its
-/// standard deviation. As for [`gain`], records there are sound, so that cases with other clocks tell nothing.
+/// standard deviation. As for [`gain`], records there are sound: cases with other clocks tell nothing.
 fn other_session(case: &Case, diagnosis: &Diagnosis) -> Result<Option<f64>, ChallengeError> {
     let mut terms = diagnosis.carried.terms();
     if terms.is_empty() || case.conditions.has_clock_offset() {

@@ -208,8 +208,7 @@ fn stages(datasets: &[Dataset], options: &Options, min_common_clock_s: f64) -> R
     }
     let (log, spans) = (check_rows(records), check_spans(records));
     let model = structure.model();
-    let names: Vec<String> =
-        records.iter().map(|dataset| dataset.provenance.name.clone().unwrap_or_else(|| "dataset".to_owned())).collect();
+    let names = session_names(records);
     begins(Step::CarryOver);
     let carry_over: Vec<CarryOver> =
         (0..model.candidates.len()).map(|candidate| carry_over(model, candidate, &names)).collect();
@@ -268,6 +267,7 @@ fn stages(datasets: &[Dataset], options: &Options, min_common_clock_s: f64) -> R
         calibration: calibration_of(model),
         gain,
         gain_why_null,
+        nested: Vec::new(),
         next_experiment_why_null: next.as_ref().err().cloned(),
         next_experiment: next.ok(),
         calibration_file: None,
@@ -276,6 +276,12 @@ fn stages(datasets: &[Dataset], options: &Options, min_common_clock_s: f64) -> R
     };
     let (found, carried) = (FittedModel::of(model), FittedModel::of(&carried));
     Ok(Diagnosis { document, extended, residuals, alternatives, base, calibrated, found, carried, geometry_alone })
+}
+
+/// What sessions are called.
+pub(crate) fn session_names(datasets: &[Dataset]) -> Vec<String> {
+    let name = |dataset: &Dataset| dataset.provenance.name.clone().unwrap_or_else(|| "dataset".to_owned());
+    datasets.iter().map(name).collect()
 }
 
 /// The base fit, of thinned measurements where odometry seems uncorrelated with all of them: between frequent

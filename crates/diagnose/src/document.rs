@@ -47,6 +47,9 @@ pub struct Document {
     /// Why there is no gain.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gain_why_null: Option<String>,
+    /// What extended models gain whose effects were chosen without what they are measured on; empty where
+    /// that was not asked for.
+    pub nested: Vec<NestedGain>,
     /// What to drive to discriminate the causes.
     pub next_experiment: Option<NextExperiment>,
     /// Why there is nothing to drive.
@@ -231,6 +234,35 @@ pub struct LevelGain {
     pub log_score_per_observation: Compared,
     /// As in [`Gain`].
     pub drift_percent: Option<Compared>,
+}
+
+/// What extended models gain whose effects were chosen without what they are measured on.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NestedGain {
+    /// What was left out in turn.
+    pub level: GainLevel,
+    /// How many units were held against a diagnosis of the others.
+    pub units: usize,
+    /// How many of these had a diagnosis that extends nothing, and so gain nothing.
+    pub abstained: usize,
+    /// Final position error of dead reckoning over the distance: base − extended, the interval over units.
+    pub drift_percent: Option<Compared>,
+    /// Each unit.
+    pub held_out: Vec<HeldOutUnit>,
+}
+
+/// One unit that was left out of a diagnosis.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct HeldOutUnit {
+    /// The session or kind of path.
+    pub unit: String,
+    /// Effects of the mean in the others' extended model; `None` where they have none.
+    pub found: Option<Vec<String>>,
+    /// Why there is no model, or nothing to hold it against.
+    pub why_null: Option<String>,
+    /// Mean final position error of dead reckoning over the unit's runs, metres: base − extended, with an
+    /// interval over the runs; `None` with fewer than two.
+    pub final_position_m: Option<Compared>,
 }
 
 impl Gain {

@@ -29,7 +29,7 @@ struct Unit {
 
 /// What is held out together.
 #[derive(Clone, Copy)]
-enum HeldOut<'u> {
+pub(crate) enum HeldOut<'u> {
     /// Runs, or blocks of them, in a few folds.
     Runs,
     /// All runs of a unit.
@@ -99,19 +99,12 @@ fn compared(
         sum.1 += before.equations.count.max(after.equations.count);
     }
     let pairs: Vec<(f64, f64)> = pairs.into_values().collect();
-    let (mean, error) = ratio(&pairs);
-    let half_width = student_95(pairs.len() as f64 - 1.0) * error;
-    let log_score = Compared {
-        base: per_observation(&before),
-        extended: per_observation(&after),
-        low: mean - half_width,
-        high: mean + half_width,
-    };
+    let log_score = Compared::of_ratio(per_observation(&before), per_observation(&after), &pairs);
     Ok((before.len(), (log_score, drift(&reckoned_before, &reckoned_after, held_out))))
 }
 
 /// Drift under both models, by what was held out together.
-fn drift(before: &[EndError], after: &[EndError], held_out: HeldOut<'_>) -> Option<Compared> {
+pub(crate) fn drift(before: &[EndError], after: &[EndError], held_out: HeldOut<'_>) -> Option<Compared> {
     let by_unit = |ends: &[EndError]| -> Vec<(f64, f64)> {
         let mut sums: BTreeMap<(usize, usize), (f64, f64)> = BTreeMap::new();
         for end in ends {
@@ -132,14 +125,16 @@ fn drift(before: &[EndError], after: &[EndError], held_out: HeldOut<'_>) -> Opti
     let percent = |units: &[(f64, f64)]| 100.0 * units.iter().map(|unit| unit.0).sum::<f64>() / distance_m;
     let pairs: Vec<(f64, f64)> =
         before.iter().zip(&after).map(|(before, after)| (100.0 * (before.0 - after.0), before.1)).collect();
-    let (mean, error) = ratio(&pairs);
-    let half_width = student_95(pairs.len() as f64 - 1.0) * error;
-    Some(Compared {
-        base: percent(&before),
-        extended: percent(&after),
-        low: mean - half_width,
-        high: mean + half_width,
-    })
+    Some(Compared::of_ratio(percent(&before), percent(&after), &pairs))
+}
+
+impl Compared {
+    /// Two scores with the interval of their difference, which is Σa/Σb over pairs of two units or more.
+    pub(crate) fn of_ratio(base: f64, extended: f64, pairs: &[(f64, f64)]) -> Self {
+        let (mean, error) = ratio(pairs);
+        let half_width = student_95(pairs.len() as f64 - 1.0) * error;
+        Self { base, extended, low: mean - half_width, high: mean + half_width }
+    }
 }
 
 /// Σa/Σb over units and its standard error, linearised.

@@ -34,6 +34,7 @@ mod large_errors;
 mod log_rows;
 mod mean_structure;
 mod model_comparison;
+mod nested_gain;
 mod noise_effects;
 mod null_distribution;
 mod outlier_attribution;
@@ -61,10 +62,11 @@ mod wald;
 pub use alternatives::{Alternative, Status};
 pub use diagnosis::{DiagnoseError, Diagnosis, FittedModel, Options, diagnose};
 pub use document::{
-    Blind, CandidateCause, Check, Compared, Differences, Document, Finding, Gain, GainLevel, LevelGain, NextExperiment,
-    PlannedSession, Predicted, Smallest, UnlistedTerm, Value, Verdict,
+    Blind, CandidateCause, Check, Compared, Differences, Document, Finding, Gain, GainLevel, HeldOutUnit, LevelGain,
+    NestedGain, NextExperiment, PlannedSession, Predicted, Smallest, UnlistedTerm, Value, Verdict,
 };
 pub use extended_model::{ExtendedModel, ExtendedModelError, ModelledEffect};
+pub use nested_gain::nested_gains;
 pub use plan::{HANDLING_S, Limits, MINUTES, PlanError, ScenarioPlan, moved_over_m, plan_scenario};
 pub use residuals::{Bin, Component, Profile, Residuals, ResidualsByCovariate};
 pub use rivals::Refusal;
