@@ -18,9 +18,9 @@ fn of_sessions(gains: &[NestedGain]) -> &NestedGain {
 
 const TURN_RATE: &str = "[[effect]]\nkind = \"turn_rate_wheelbase\"\nbeta_s = 0.05\n";
 
-/// Of two sessions one has an effect. Left out, it is held against a model that was found in the sound one and
-/// so abstains; the sound one is held against the effect, which it does not have and does not confirm. A gain whose effects were
-/// chosen in both has the effect in both units.
+/// Of two sessions one has an effect. Left out, it is held against a model that was found in the sound one
+/// and so abstains; the sound one is held against the effect, which it does not have and does not confirm. A
+/// gain whose effects were chosen in both has the effect in both units.
 #[test]
 fn the_choice_of_effects_has_not_seen_what_is_held_out() {
     let datasets = [session(TURN_RATE, "monday", 81), session("", "tuesday", 82)];

@@ -22,8 +22,8 @@ use crate::record_faults::sessions;
 /// A diagnosis each costs as much as that of all data.
 ///
 /// # Errors
-/// [`DiagnoseError`] when no calibrated model can be fitted to all runs, whose paths then have no kinds, or an
-/// id is unknown.
+/// [`DiagnoseError`] when no calibrated model can be fitted to all runs, whose paths then have no kinds, or
+/// an id is unknown.
 pub fn nested_gains(datasets: &[Dataset], options: &Options) -> Result<Vec<NestedGain>, DiagnoseError> {
     let fit = FitSettings::GEOMETRY_ONLY.fit(&sessions(datasets))?;
     let (model, names) = (AugmentedModel::base(&fit), session_names(datasets));

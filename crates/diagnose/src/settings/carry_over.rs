@@ -45,7 +45,7 @@ pub(crate) const MAX_LESS_THAN_HALF: f64 = 0.05;
 /// Convention: 10 %, as its power is low with few units (Higgins and Thompson 2002).
 pub(crate) const HETEROGENEITY_LEVEL: f64 = 0.1;
 
-/// Probability. Where no other session or kind of path was driven, a term is in the extended model whose cause
-/// is so probable.
+/// Probability. Where no other session or kind of path was driven, a term is in the extended model whose
+/// cause is so probable.
 /// Derived: more likely than all others together.
 pub(crate) const MIN_ESTABLISHED_PROBABILITY: f64 = 0.5;
