@@ -187,7 +187,8 @@ pub(crate) fn diagnosed(_: &[Sample], random: &mut Xoshiro256PlusPlus, _: &Path)
             if let Some(gain) = &document.gain {
                 let (compared, drift) = (&gain.log_score_per_observation, &gain.drift_percent);
                 let numbers = [Some(compared), drift.as_ref()].into_iter().flatten();
-                let is_sound = |of: &diagnose::Compared| [of.base, of.extended, of.low, of.high].iter().all(|n| n.is_finite());
+                let is_sound =
+                    |of: &diagnose::Compared| [of.base, of.extended, of.low, of.high].iter().all(|n| n.is_finite());
                 assert!(numbers.into_iter().all(is_sound), "{gain:?}");
             }
             sound(&document.sentence, "diagnosis");

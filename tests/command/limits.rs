@@ -109,7 +109,7 @@ fn a_count_that_no_counter_reaches_is_refused() {
     let at = temp.path();
     dataset(at, "set", "set", ["a", "b"]);
     let rows = fs::read_to_string(at.join("set/odometry.csv")).expect("read");
-    // Of the last row: 2 to the power of 56 is taken for a count (and for a spike of the counter), one more is none.
+    // Of the last row: 2⁵⁶ is taken for a count, and for a spike of the counter.
     let with = |count: u64| {
         let (head, _) = rows.trim_end().rsplit_once(',').expect("columns");
         write(at, "set/odometry.csv", format!("{head},{count}\n"));
