@@ -240,22 +240,4 @@ mod tests {
         let midpoint = Increment { distance_m: radius_m * PI / 2.0, turn_rad: PI / 2.0 }.midpoint();
         assert!((midpoint.x_m / arc.x_m - PI / 4.0 / (PI / 4.0).sin()).abs() < 1e-15);
     }
-
-    #[test]
-    fn a_perturbed_end_lies_in_the_frame_of_the_chord() {
-        let increment = Increment { distance_m: 1.2, turn_rad: 0.8 };
-        let perturbed = increment.perturbed_arc(0.3, -0.2);
-        // The chord of an arc stands at half of its turn.
-        let chord = Pose::new(0.0, 0.0, 0.4);
-        let along = increment.arc().position();
-        let expected = chord * crate::Point { x_m: (chord.inverse() * along).x_m + 0.3, y_m: -0.2 };
-        // Three roundings of numbers near 1.
-        assert!(perturbed.pose().position().distance_m(expected) < 1e-15, "{perturbed:?}");
-        assert!((perturbed.pose().theta_rad - 0.8).abs() < 1e-15);
-        // Its heading, by products of the half's: what it turns.
-        let ahead = perturbed * Pose::new(1.0, 0.0, 0.0);
-        let place = perturbed.pose().position();
-        assert!((ahead.x_m - place.x_m - 0.8_f64.cos()).abs() < 1e-15);
-        assert!((ahead.y_m - place.y_m - 0.8_f64.sin()).abs() < 1e-15);
-    }
 }
