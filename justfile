@@ -76,6 +76,10 @@ fuzz:
 kills:
     .ci/run kills
 
+# Does a test fail when an expression is changed? 90 random mutants of a crate: .ci/run mutants CRATE [SEED]; needs cargo-mutants
+mutants:
+    .ci/run mutants
+
 # Licences, sources and duplicate versions of the dependencies, and those that nobody uses; needs cargo-deny and cargo-machete
 dependencies:
     .ci/run dependencies

@@ -165,9 +165,33 @@ pub(crate) fn diagnosed(_: &[Sample], random: &mut Xoshiro256PlusPlus, _: &Path)
             false
         }
         Ok(found) => {
-            for finding in &found.document.findings {
-                assert!(finding.probability.is_finite(), "{}: probability {}", finding.id, finding.probability);
+            let document = &found.document;
+            for finding in &document.findings {
+                let (id, parameters) = (&finding.id, &finding.parameters);
+                let numbers = [finding.probability, finding.z, finding.p_value];
+                assert!(numbers.iter().all(|number| number.is_finite()), "{id}: probability, z and p {numbers:?}");
+                let is_sound = |of: &diagnose::Value| of.value.is_finite() && of.sigma.is_none_or(f64::is_finite);
+                assert!(parameters.values().all(is_sound), "{id}: {parameters:?}");
+                sound(&finding.sentence, id);
             }
+            for check in &document.checks {
+                assert!(check.statistic.is_finite() && check.p_value.is_finite(), "{check:?}");
+            }
+            for candidate in &document.candidates {
+                assert!(candidate.z.is_finite() && candidate.log_odds.is_finite(), "{candidate:?}");
+            }
+            for limit in document.sensitivity.iter().chain(&document.blind_to) {
+                sound(&limit.why, &limit.id);
+                assert!(limit.smallest_detectable.as_ref().is_none_or(|size| size.value.is_finite()), "{limit:?}");
+            }
+            if let Some(gain) = &document.gain {
+                let (compared, drift) = (&gain.log_score_per_observation, &gain.drift_percent);
+                let numbers = [Some(compared), drift.as_ref()].into_iter().flatten();
+                let is_sound =
+                    |of: &diagnose::Compared| [of.base, of.extended, of.low, of.high].iter().all(|n| n.is_finite());
+                assert!(numbers.into_iter().all(is_sound), "{gain:?}");
+            }
+            sound(&document.sentence, "diagnosis");
             true
         }
     }

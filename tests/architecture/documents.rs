@@ -1,5 +1,7 @@
 //! The documents have every key, effect and method, and their links lead somewhere.
 
+use std::collections::BTreeSet;
+
 use motion_programs::Schedule;
 use scenario::Scenario;
 
@@ -85,4 +87,34 @@ fn every_method_is_documented_and_every_link_leads_somewhere() {
             assert!(target.is_empty() || target.starts_with("http") || here.exists(), "{}: {target}", file.display());
         }
     }
+}
+
+/// The rows of a promise in docs/reliability.md that name no test, and the names that are no test's.
+fn promises_without_a_test(document: &str, tests: &BTreeSet<String>) -> Vec<String> {
+    let (_, section) = document.split_once("## Promises").expect("promises");
+    let section = section.split("\n## ").next().unwrap_or_default();
+    let rows = section.lines().filter(|line| line.starts_with("| ") && !line.starts_with("| promise |"));
+    let wrong = rows.filter(|row| !row.starts_with("| --- ")).filter(|row| {
+        let tested_by = row.trim_end_matches([' ', '|']).rsplit('|').next().unwrap_or_default();
+        let mut names = tested_by.split('`').skip(1).step_by(2).filter(|name| name.contains('_')).peekable();
+        names.peek().is_none() || names.any(|name| !tests.contains(name))
+    });
+    wrong.map(str::to_owned).collect()
+}
+
+#[test]
+fn every_promise_of_reliability_names_tests_that_exist() {
+    let mut tests = BTreeSet::new();
+    for file in ["crates", "tests", "fuzz", "src"].iter().flat_map(|folder| files(folder)) {
+        if file.extension().is_some_and(|extension| extension == "rs") {
+            let source = text(&file);
+            let after = source.split("#[test]").skip(1).filter_map(|rest| rest.split_once("fn ")?.1.split_once('('));
+            tests.extend(after.map(|(name, _)| name.to_owned()));
+        }
+    }
+    assert_eq!(promises_without_a_test(&text("docs/reliability.md"), &tests), [""; 0]);
+    let document = "## Promises\n| promise | limit | tested by |\n| --- | --- | --- |\n| A. | – | `fuzz/` |\n\
+                    | B. | – | `a_file_that_ends`, `no_such_test` |\n| C. | – | `a_file_that_ends` |\n## Fuzzing\n";
+    let found = promises_without_a_test(document, &BTreeSet::from(["a_file_that_ends".to_owned()]));
+    assert_eq!(found.len(), 2, "{found:?}");
 }

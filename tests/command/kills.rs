@@ -1,8 +1,8 @@
 //! `kill -9` at random instants: whatever is there afterwards is whole, doing it again or going on gives the
 //! bytes of an undisturbed run, and nothing of the killed one is left.
 //!
-//! `cargo test` tries a few instants. `.ci/run kills` tries two hundred; docs/reliability.md has what came of
-//! them.
+//! `cargo test` tries a few instants. `.ci/run kills` tries two hundred, with YAIR_KILLS_OF="sweep --shard"
+//! those of this command alone; docs/reliability.md has what came of them.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -145,7 +145,11 @@ fn two_hundred_instants() {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(200);
     println!("| command | instants | killed at work | its folder was there | other bytes, or something left |");
     println!("| --- | --- | --- | --- | --- |");
-    for (task, instants) in tasks(here, SWEPT, 150_000).iter().zip(INSTANTS) {
+    let only = std::env::var("YAIR_KILLS_OF").ok();
+    let tasks = tasks(here, SWEPT, 150_000);
+    let asked = |task: &Task| only.as_ref().is_none_or(|name| name == task.name);
+    assert!(tasks.iter().any(asked), "YAIR_KILLS_OF names none of the commands");
+    for (task, instants) in tasks.iter().zip(INSTANTS).filter(|(task, _)| asked(task)) {
         let (at_work, there) = killed(here, task, instants, &mut random);
         println!("| `{}` | {instants} | {at_work} | {there} | 0 |", task.name);
     }

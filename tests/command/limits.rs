@@ -78,6 +78,50 @@ fn more_runs_than_a_manifest_holds_are_refused() {
     assert!(message.contains("dataset.toml: longer than 4194304 bytes"), "{message}");
 }
 
+#[test]
+fn a_file_beyond_its_limit_is_refused_before_it_is_read() {
+    let temp = tempfile::tempdir().expect("a temporary folder");
+    let at = temp.path();
+    // Holes: the files take no room on the disk.
+    let long = |name: &str, bytes: u64| {
+        write(at, name, "");
+        fs::File::options().write(true).open(at.join(name)).and_then(|file| file.set_len(bytes)).expect("made longer");
+    };
+    long("log.csv", (1 << 30) + 1);
+    long("scenario.toml", (1 << 20) + 1);
+    long("shard/sweep.state.json", (1 << 30) + 1);
+    long("bag/metadata.yaml", (16 << 20) + 1);
+    for (arguments, expected) in [
+        (&["import", "csv", "log.csv", "--out", "out", "--wheel", "0.15", "--base", "0.3"][..], "1073741824 bytes"),
+        (&["simulate", "scenario.toml", "--out", "out"], "at most 1048576 bytes"),
+        (&["merge", "shard", "--out", "out"], "longer than 1073741824 bytes"),
+        (&["import", "ros2", "bag", "--list"], "longer than 16 MiB"),
+    ] {
+        let message = refusal(at, arguments);
+        assert!(message.contains(expected), "{arguments:?}: {message}");
+    }
+    assert!(!at.join("out").exists());
+}
+
+#[test]
+fn a_count_that_no_counter_reaches_is_refused() {
+    let temp = tempfile::tempdir().expect("a temporary folder");
+    let at = temp.path();
+    dataset(at, "set", "set", ["a", "b"]);
+    let rows = fs::read_to_string(at.join("set/odometry.csv")).expect("read");
+    // Of the last row: 2⁵⁶ is taken for a count, and for a spike of the counter.
+    let with = |count: u64| {
+        let (head, _) = rows.trim_end().rsplit_once(',').expect("columns");
+        write(at, "set/odometry.csv", format!("{head},{count}\n"));
+    };
+    with((1 << 56) + 1);
+    let message = refusal(at, &["check", "set"]);
+    assert!(message.contains("odometry.csv") && message.contains("72057594037927937"), "{message}");
+    with(1 << 56);
+    let message = run_in(at, &["check", "set"]).stderr;
+    assert!(!message.contains("72057594037927936"), "{message}");
+}
+
 #[cfg(unix)]
 #[test]
 fn links_lead_nowhere_else() {

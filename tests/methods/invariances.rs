@@ -3,7 +3,7 @@
 
 use yair::calib::{Calibration, method};
 use yair::dataset::import::csv::{Options, RobotGiven};
-use yair::dataset::{Dataset, Run, TruthSample};
+use yair::dataset::{Dataset, Run, TruthSample, WheelLog};
 use yair::kinematics::{Pose, Wheels};
 use yair::scenario::Scenario;
 
@@ -87,26 +87,101 @@ fn in_time(dataset: &Dataset, factor: f64, shift_s: f64) -> Dataset {
 fn lengths_scale_with_lengths_and_not_with_times() {
     let dataset = measured(9);
     let base = joint(&dataset);
-    let mut larger = with_poses(&dataset, |_, pose| Pose { x_m: 2.0 * pose.x_m, y_m: 2.0 * pose.y_m, ..pose });
+    same(&base, &joint(&twice_as_large(&dataset)), 2.0);
+    same(&base, &joint(&in_time(&dataset, 2.0, 0.0)), 1.0);
+}
+
+/// The same runs of a robot twice as large in a room twice as large.
+fn twice_as_large(dataset: &Dataset) -> Dataset {
+    let mut larger = with_poses(dataset, |_, pose| Pose { x_m: 2.0 * pose.x_m, y_m: 2.0 * pose.y_m, ..pose });
     larger.robot.left_wheel_diameter_m *= 2.0;
     larger.robot.right_wheel_diameter_m *= 2.0;
     larger.robot.wheel_separation_m *= 2.0;
     larger.truth_noise.sigma_xy_m = larger.truth_noise.sigma_xy_m.map(|sigma_m| 2.0 * sigma_m);
-    same(&base, &joint(&larger), 2.0);
-    same(&base, &joint(&in_time(&dataset, 2.0, 0.0)), 1.0);
+    larger
+}
+
+fn diagnosed(dataset: Dataset) -> Vec<diagnose::Finding> {
+    diagnose::diagnose(&[dataset], &diagnose::Options::default()).expect("diagnosed").document.findings
+}
+
+/// That two diagnoses name the same causes, with the same sizes in standard deviations: of lengths `factor`
+/// times as large.
+#[track_caller]
+fn same_findings(base: &[diagnose::Finding], other: &[diagnose::Finding], factor: f64) {
+    let names = |all: &[diagnose::Finding]| {
+        all.iter().map(|finding| (finding.id.clone(), finding.names.clone())).collect::<Vec<_>>()
+    };
+    assert!(!base.is_empty(), "nothing was found");
+    assert_eq!(names(base), names(other));
+    for (one, two) in base.iter().zip(other) {
+        for (name, value) in &one.parameters {
+            let factor = if value.unit == "m" { factor } else { 1.0 };
+            let (sigma, scaled) = (value.sigma.expect("a scatter"), two.parameters[name].value / factor);
+            assert!((scaled - value.value).abs() < SAME * sigma, "{}: {name} is {} and {scaled}", one.id, value.value);
+        }
+    }
+}
+
+/// The eccentric wheel of the scenario has no size in metres or seconds.
+#[test]
+fn a_diagnosis_scales_with_lengths_and_times() {
+    let dataset = measured(6);
+    let base = diagnosed(dataset.clone());
+    same_findings(&base, &diagnosed(twice_as_large(&dataset)), 2.0);
+    same_findings(&base, &diagnosed(in_time(&dataset, 2.0, 0.0)), 1.0);
 }
 
 #[test]
 fn a_diagnosis_does_not_depend_on_frame_and_order() {
     let dataset = measured(6);
-    let said = |dataset: Dataset| {
-        let found = diagnose::diagnose(&[dataset], &diagnose::Options::default()).expect("diagnosed");
-        let finding = |finding: &diagnose::Finding| (finding.id.clone(), finding.names.clone());
-        found.document.findings.iter().map(finding).collect::<Vec<_>>()
-    };
     let mut turned = with_poses(&dataset, |_, pose| moved(pose, -1.3, 8.0, 20.0));
     turned.runs.reverse();
-    assert_eq!(said(turned), said(dataset));
+    same_findings(&diagnosed(dataset), &diagnosed(turned), 1.0);
+}
+
+/// Rows of a table as they are imported: a run, instants, poses and counts, with empty cells where a row has
+/// none; `scale` multiplies time, places and headings.
+fn imported(name: &str, header: &str, scale: [f64; 3], dataset: &Dataset) -> Dataset {
+    let mut table = format!("{header}\n");
+    for run in &dataset.runs {
+        let WheelLog::Ticks(ticks) = &run.odometry.wheels else { panic!("the simulated robot counts") };
+        let counts = run.odometry.t_s.iter().zip(ticks.left.iter().zip(&ticks.right));
+        let counted = counts.map(|(t_s, (left, right))| (*t_s, format!(",,,{left},{right}")));
+        let seen = run.truth.iter().map(|sample| {
+            let [_, length, angle] = scale;
+            let theta = sample.theta_rad().map_or(String::new(), |theta_rad| (theta_rad * angle).to_string());
+            (sample.t_s, format!("{},{},{theta},,", sample.x_m * length, sample.y_m * length))
+        });
+        let mut rows: Vec<(f64, String)> = counted.chain(seen).collect();
+        rows.sort_by(|one, two| one.0.total_cmp(&two.0));
+        for (t_s, cells) in rows {
+            table += &format!("{},{},{cells}\n", run.info.id, t_s * scale[0]);
+        }
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join(name);
+    std::fs::write(&file, table).expect("written");
+    let robot = &dataset.robot;
+    let robot = RobotGiven {
+        wheel_diameter_m: Some(Wheels { left: robot.left_wheel_diameter_m, right: robot.right_wheel_diameter_m }),
+        wheel_separation_m: Some(robot.wheel_separation_m),
+        ticks_per_rev: robot.ticks_per_rev,
+        counter_bits: None,
+    };
+    let options = Options { robot, ..Options::default() };
+    dataset::import::csv::read(&[file], &options).expect("imported").imported.dataset
+}
+
+#[test]
+fn a_diagnosis_does_not_depend_on_the_units_of_a_table() {
+    let dataset = measured(6);
+    let si = imported("si.csv", "run,t_s,x_m,y_m,theta_rad,left_ticks,right_ticks", [1.0; 3], &dataset);
+    let degrees = 180.0 / std::f64::consts::PI;
+    let header = "run,t_ms,x_mm,y_mm,theta_deg,left_ticks,right_ticks";
+    let other = imported("other.csv", header, [1e3, 1e3, degrees], &dataset);
+    assert_eq!(si.runs.len(), dataset.runs.len());
+    same_findings(&diagnosed(si), &diagnosed(other), 1.0);
 }
 
 #[test]

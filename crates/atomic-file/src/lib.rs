@@ -37,13 +37,18 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
 /// # Errors
 /// The system's, and [`io::ErrorKind::FileTooLarge`] with the limit in its message.
 pub fn read_at_most(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    File::open(path)?.take(max_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > max_bytes {
+    let too_long = || {
         let why = format!("longer than {max_bytes} bytes; is this the right file?");
-        return Err(io::Error::new(io::ErrorKind::FileTooLarge, why));
+        io::Error::new(io::ErrorKind::FileTooLarge, why)
+    };
+    let file = File::open(path)?;
+    // Before it costs memory; a pipe has no length.
+    if file.metadata()?.len() > max_bytes {
+        return Err(too_long());
     }
-    Ok(bytes)
+    let mut bytes = Vec::new();
+    file.take(max_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > max_bytes { Err(too_long()) } else { Ok(bytes) }
 }
 
 /// Makes a folder inside of `out`; a link in its place, which may lead anywhere, is refused.
