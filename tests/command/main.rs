@@ -32,3 +32,4 @@ mod spoiled_files;
 #[path = "../support/mod.rs"]
 mod support;
 mod sweep_campaign;
+mod wall;
