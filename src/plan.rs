@@ -45,6 +45,9 @@ pub(crate) struct Arguments {
 /// Time of a plan where nobody says another, minutes, as `--minutes` has it.
 const MINUTES: f64 = 10.0;
 
+/// What a person needs for each run where nobody says, seconds, as a plan has it.
+const HANDLING_S: f64 = 20.0;
+
 fn positive(text: &str) -> Result<f64, String> {
     let value: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
     if value.is_finite() && value > 0.0 { Ok(value) } else { Err("it must be positive".to_owned()) }
@@ -93,7 +96,7 @@ fn instruments(
         clearance_m: own.map_or(2.0 * robot.robot.wheel_separation_m, |own| own.clearance_m),
         minutes: Some(minutes),
         metres: None,
-        handling_s: own.and_then(|own| own.handling_s).or(Some(0.0)),
+        handling_s: Some(own.and_then(|own| own.handling_s).unwrap_or(HANDLING_S)),
     };
     let all = expected(robot, budget)?;
     show_instruments(&all, budget, terminal)?;

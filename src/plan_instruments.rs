@@ -9,7 +9,8 @@ use std::collections::BTreeMap;
 
 use bench::FisherInformation;
 use calib::Parameter;
-use scenario::{Budget, Engine, Scenario};
+use motion_programs::{Motion, MotionProgram};
+use scenario::{Budget, Engine, NoFit, Scenario};
 use serde::Serialize;
 
 use crate::terminal::{Failure, Terminal, table};
@@ -71,7 +72,7 @@ fn of_instrument(
         minutes: 0.0,
         why_null: None,
     };
-    let programs = match scenario.programs_for("joint") {
+    let programs = match within_budget(&scenario, budget) {
         Ok(programs) => programs,
         Err(why) => return Ok(Expected { why_null: Some(why.to_string()), ..expected }),
     };
@@ -93,7 +94,21 @@ fn of_instrument(
             expected.relative.insert(parameter.key(), variance.sqrt() / value_m);
         }
     }
+    let open: Vec<&str> =
+        parameters.into_iter().map(|(of, _)| of.key()).filter(|of| !expected.sigmas.contains_key(of)).collect();
+    if !open.is_empty() {
+        expected.why_null = Some(format!("what can be driven here does not determine {}", open.join(", ")));
+    }
     Ok(expected)
+}
+
+/// What is driven within a budget that counts the standstills of each run too.
+fn within_budget(scenario: &Scenario, budget: Budget) -> Result<Vec<MotionProgram>, NoFit> {
+    let programs = scenario.programs_for("joint")?;
+    let pause_s = |motion: &Motion| if let Motion::Pause { duration_s } = motion { *duration_s } else { 0.0 };
+    let standing_s: f64 = programs.first().map_or(0.0, |program| program.motions.iter().map(pause_s).sum());
+    let handling_s = Some(budget.handling_s.unwrap_or(0.0) + standing_s);
+    Scenario { budget: Some(Budget { handling_s, ..budget }), ..scenario.clone() }.programs_for("joint")
 }
 
 /// The table for people.

@@ -19,6 +19,7 @@ mod import_csv;
 mod import_ros2;
 mod import_scans;
 mod import_tum;
+mod instruments;
 #[cfg(unix)]
 mod interrupt;
 #[cfg(unix)]
