@@ -35,7 +35,7 @@ pub struct Preflight {
     pub problems: Vec<Problem>,
     /// Which parameters of the drive these runs determine.
     pub determined: BTreeMap<&'static str, bool>,
-    /// What would determine those that they do not, beside the same drives; empty where a problem is an error.
+    /// What would determine the others, beside the same drives; empty where a problem is an error.
     pub would_determine: Vec<WouldDetermine>,
 }
 

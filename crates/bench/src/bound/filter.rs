@@ -52,7 +52,7 @@ pub(super) struct Filter<'a> {
 }
 
 /// What a run tells.
-pub(super) struct Told {
+pub(super) struct RunInformation {
     /// What each measurement of a pose adds.
     pub(super) innovations: Vec<LinearizedInnovation>,
     /// What partial measurements tell of both diameters, the separation and a gyroscope's scale.
@@ -60,7 +60,7 @@ pub(super) struct Told {
 }
 
 impl<'a> Filter<'a> {
-    pub(super) fn run(model: &'a Model, timeline: &Timeline) -> Result<Told, NoBound> {
+    pub(super) fn run(model: &'a Model, timeline: &Timeline) -> Result<RunInformation, NoBound> {
         let first_rounding = Wheels { left: ROUNDING, right: ROUNDING + timeline.phases.left.len() };
         let mut size = first_rounding.right + timeline.phases.right.len();
         let mut partial = Vec::with_capacity(model.partial.len());
@@ -108,7 +108,7 @@ impl<'a> Filter<'a> {
                 },
             }
         }
-        Ok(Told { innovations: filter.innovations, partial: filter.partial_information })
+        Ok(RunInformation { innovations: filter.innovations, partial: filter.partial_information })
     }
 
     /// What is drawn once a motion is drawn anew.

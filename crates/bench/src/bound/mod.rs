@@ -28,7 +28,7 @@ use nalgebra::{Matrix3, Matrix4, SymmetricEigen, Vector3};
 use scenario::Scenario;
 
 pub use error::NoBound;
-use filter::{Filter, Told};
+use filter::{Filter, RunInformation};
 pub use innovation::LinearizedInnovation;
 use model::Model;
 use timeline::Timeline;
@@ -40,12 +40,12 @@ impl LinearizedInnovation {
     /// # Errors
     /// [`NoBound`] with the reason.
     pub fn of_run(scenario: &Scenario, program: &MotionProgram) -> Result<Vec<Self>, NoBound> {
-        Ok(told(&Model::of(scenario)?, &program.motions)?.innovations)
+        Ok(run_information(&Model::of(scenario)?, &program.motions)?.innovations)
     }
 }
 
 /// What the measurements of a run tell.
-fn told(model: &Model, motions: &[Motion]) -> Result<Told, NoBound> {
+fn run_information(model: &Model, motions: &[Motion]) -> Result<RunInformation, NoBound> {
     Filter::run(model, &Timeline::of(model, motions))
 }
 
@@ -90,7 +90,7 @@ impl FisherInformation {
         }
         let (mut matrix, mut in_part) = (Matrix3::zeros(), Matrix4::zeros());
         for (program, runs) in kinds {
-            let Told { innovations, partial } = told(&model, &program.motions)?;
+            let RunInformation { innovations, partial } = run_information(&model, &program.motions)?;
             matrix += runs * innovations.iter().map(LinearizedInnovation::information).sum::<Matrix3<f64>>();
             in_part += runs * partial;
         }
