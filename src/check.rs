@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use calib::Names;
 use clap::Args;
 use dataset::{Blocks, Dataset};
-use preflight::{Preflight, Problem, Severity};
+use preflight::{Preflight, Problem, Severity, WouldDetermine};
 use serde::Serialize;
 
 use crate::terminal::{Failure, Terminal, advance, folder_name, read_datasets, table};
@@ -28,6 +28,7 @@ struct Document<'a> {
     ok: bool,
     problems: &'a [Problem],
     determined: &'a BTreeMap<&'static str, bool>,
+    would_determine: &'a [WouldDetermine],
 }
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
@@ -40,6 +41,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         ok: found.is_ok(),
         problems: &found.problems,
         determined: &found.determined,
+        would_determine: &found.would_determine,
     })?;
     Ok(if found.is_ok() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
@@ -76,6 +78,9 @@ fn show(found: &Preflight, terminal: &Terminal) -> Result<(), Failure> {
     terminal.say(&format!("determined by these runs: {}", of(true)))?;
     if found.determined.values().any(|is| !is) {
         terminal.say(&format!("not determined: {}", of(false)))?;
+    }
+    for open in &found.would_determine {
+        terminal.say(&format!("  {}", open.sentence))?;
     }
     Ok(())
 }

@@ -155,6 +155,11 @@ fn import(arguments: &Arguments, out: &Path, terminal: &Terminal) -> Result<(), 
         let TookTopic { topic, type_name, what: of, quantity, rows, times } = topic;
         terminal.say(&format!("{what}: {topic} ({type_name}), {of}, {quantity}, {rows} rows by {times} ({flag})"))?;
     }
+    if took.gyro.is_some() && arguments.gyro.is_none() {
+        terminal.say(
+            "  the gyro was taken unasked and weighs in calibrate: to leave it out, delete the column gyro_radps of odometry.csv",
+        )?;
+    }
     for warning in &warnings {
         terminal.remark(&format!("warning: {warning}"));
     }

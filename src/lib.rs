@@ -62,6 +62,7 @@ mod manual;
 mod merge;
 mod plain_text;
 mod plan;
+mod plan_instruments;
 mod reproduce;
 mod session_identity;
 mod shard;

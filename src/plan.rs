@@ -5,11 +5,12 @@ use std::process::ExitCode;
 
 use ::diagnose::{Diagnosis, Limits, NextExperiment, Options, Verdict, plan_scenario};
 use clap::Args;
-use scenario::Scenario;
+use scenario::{Budget, Scenario};
 use serde::Serialize;
 
 use crate::diagnose_command::shown_on;
 use crate::html_report::write_plan;
+use crate::plan_instruments::{Expected, expected, show as show_instruments};
 use crate::simulate::{refuse_filled, write_whole};
 use crate::terminal::{Failure, Terminal, advance, read_datasets, table};
 
@@ -41,6 +42,12 @@ pub(crate) struct Arguments {
     force: bool,
 }
 
+/// Time of a plan where nobody says another, minutes, as `--minutes` has it.
+const MINUTES: f64 = 10.0;
+
+/// What a person needs for each run where nobody says, seconds, as a plan has it.
+const HANDLING_S: f64 = 20.0;
+
 fn positive(text: &str) -> Result<f64, String> {
     let value: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
     if value.is_finite() && value > 0.0 { Ok(value) } else { Err("it must be positive".to_owned()) }
@@ -62,6 +69,8 @@ struct OfData {
     #[serde(skip_serializing_if = "Option::is_none")]
     next_experiment_why_null: Option<String>,
     scenarios: Vec<String>,
+    /// What other instruments would leave of ±; empty without `--room`.
+    instruments: Vec<Expected>,
 }
 
 #[derive(Serialize)]
@@ -69,6 +78,29 @@ struct OfScenario {
     #[serde(flatten)]
     plan: ::diagnose::ScenarioPlan,
     scenarios: Vec<String>,
+    /// What other instruments would leave of ±.
+    instruments: Vec<Expected>,
+}
+
+/// What other instruments would leave of ± of a robot, in a room and a time.
+fn instruments(
+    robot: &Scenario,
+    (room_m, minutes): ([f64; 2], f64),
+    terminal: &Terminal,
+) -> Result<Vec<Expected>, Failure> {
+    let own = robot.budget;
+    let budget = Budget {
+        room_x_m: room_m[0],
+        room_y_m: room_m[1],
+        // Without a budget the robot's own width on either side.
+        clearance_m: own.map_or(2.0 * robot.robot.wheel_separation_m, |own| own.clearance_m),
+        minutes: Some(minutes),
+        metres: None,
+        handling_s: Some(own.and_then(|own| own.handling_s).unwrap_or(HANDLING_S)),
+    };
+    let all = expected(robot, budget)?;
+    show_instruments(&all, budget, terminal)?;
+    Ok(all)
 }
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
@@ -95,10 +127,13 @@ fn of_data(
     bar.finish_and_clear();
     let Diagnosis { document, extended, .. } = diagnosis?;
     terminal.say(&document.sentence)?;
-    let mut scenarios = Vec::new();
+    let (mut scenarios, mut of_instruments) = (Vec::new(), Vec::new());
     match &document.next_experiment {
         Some(next) => {
             show(next, terminal)?;
+            if let (Some(room_m), Ok(robot)) = (arguments.room, &extended) {
+                of_instruments = instruments(robot, (room_m, arguments.minutes.unwrap_or(MINUTES)), terminal)?;
+            }
             if let Some(out) = &arguments.out {
                 let scenario = extended.map_err(|why| format!("{}: no plan.toml: {why}", out.display()))?;
                 scenarios = write_scenarios(out, &scenario, next, terminal)?;
@@ -123,6 +158,7 @@ fn of_data(
         next_experiment: document.next_experiment,
         next_experiment_why_null: document.next_experiment_why_null,
         scenarios,
+        instruments: of_instruments,
     })?;
     Ok(ExitCode::SUCCESS)
 }
@@ -152,7 +188,14 @@ fn of_scenario(file: &Path, limits: &Limits, arguments: &Arguments, terminal: &T
         }
         None => Vec::new(),
     };
-    terminal.document(&OfScenario { plan, scenarios })?;
+    let own = scenario.budget;
+    let room_m = limits.room_m.or_else(|| own.map(|own| [own.room_x_m, own.room_y_m]));
+    let minutes = limits.minutes.or_else(|| own.and_then(|own| own.minutes)).unwrap_or(MINUTES);
+    let instruments = match room_m {
+        Some(room_m) => instruments(&scenario, (room_m, minutes), terminal)?,
+        None => Vec::new(),
+    };
+    terminal.document(&OfScenario { plan, scenarios, instruments })?;
     Ok(ExitCode::SUCCESS)
 }
 

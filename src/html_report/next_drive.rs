@@ -19,6 +19,9 @@ fn sketches(next: &NextExperiment) -> Vec<Sketch> {
         let (manoeuvre, runs, each_way) = match *schedule {
             Schedule::Straights { length_m, runs } => (Manoeuvre::Straight { length_m }, runs, false),
             Schedule::Spins { turn_rad, runs } => (Manoeuvre::Spin { turn_rad }, runs, false),
+            Schedule::SpinsAtSpeeds { turn_rad, speeds, runs_each_way, .. } => {
+                (Manoeuvre::Spin { turn_rad }, speeds * runs_each_way, true)
+            }
             Schedule::Squares { side_m, runs_each_way } => (Manoeuvre::Square { side_m }, runs_each_way, true),
             Schedule::Circles { radius_m, runs_each_way, .. } => (Manoeuvre::Circle { radius_m }, runs_each_way, true),
             Schedule::ValidationPath { length_m, runs, .. } => (Manoeuvre::Polygon { length_m }, runs, false),

@@ -19,7 +19,7 @@ fn keys<T: serde::de::DeserializeOwned>(kind: &str) -> Vec<String> {
 fn the_scenario_document_has_every_key_and_every_effect() {
     use scenario::{
         Budget, Case, Controller, Encoder, Engine, Estimated, EstimatedTerm, Instrument, Log, Mark, Motor, Noise,
-        Placement, Range, Robot, Sobol, Sweep,
+        Placement, Range, Robot, Sobol, Sweep, Wall,
     };
     let document = text("docs/scenario.md");
     let parts = [
@@ -38,8 +38,10 @@ fn the_scenario_document_has_every_key_and_every_effect() {
         ("gyro", keys::<Instrument>("gyro")),
         ("tape", keys::<Instrument>("tape")),
         ("revisit", keys::<Instrument>("revisit")),
+        ("wall", keys::<Wall>("")),
         ("straights", keys::<Schedule>("straights")),
         ("spins", keys::<Schedule>("spins")),
+        ("spins_at_speeds", keys::<Schedule>("spins_at_speeds")),
         ("squares", keys::<Schedule>("squares")),
         ("validation_path", keys::<Schedule>("validation_path")),
         ("sweep", keys::<Sweep>("")),

@@ -313,6 +313,7 @@ fn a_gyroscope_becomes_a_column_of_mean_rates_with_its_gaps() {
     let said = run_in(at, &arguments);
     let line = "gyro: /imu (sensor_msgs/msg/Imu), angular_velocity.z of imu_link, whose z is taken as up, radps, 1901 rows by header stamps (--gyro)";
     assert!(said.stdout.contains(line), "{}", said.stdout);
+    assert!(said.stdout.contains("to leave it out, delete the column gyro_radps"), "{}", said.stdout);
     assert!(said.stderr.contains("topic /imu: 23 of 400 rows of the odometry have no rates"), "{}", said.stderr);
     let table = fs::read_to_string(at.join("new/odometry.csv")).expect("a table");
     assert!(table.starts_with("run,t_s,left_rad,right_rad,gyro_radps\n"), "{table}");

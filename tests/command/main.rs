@@ -19,6 +19,7 @@ mod import_csv;
 mod import_ros2;
 mod import_scans;
 mod import_tum;
+mod instruments;
 #[cfg(unix)]
 mod interrupt;
 #[cfg(unix)]
@@ -32,3 +33,4 @@ mod spoiled_files;
 #[path = "../support/mod.rs"]
 mod support;
 mod sweep_campaign;
+mod wall;

@@ -100,7 +100,9 @@ fn without_noise_inside(motions: &[Motion], trials: u64) -> Vec<Pose> {
             for motion in motions {
                 let increment = match *motion {
                     Motion::Straight { length_m } => Increment { distance_m: length_m, turn_rad: 0.0 },
-                    Motion::Spin { turn_rad } => Increment { distance_m: 0.0, turn_rad },
+                    Motion::Spin { turn_rad } | Motion::SpinAt { turn_rad, .. } => {
+                        Increment { distance_m: 0.0, turn_rad }
+                    }
                     _ => continue,
                 };
                 let scale = geometry.wheel_diameter_m().zip_with(nominal.wheel_diameter_m(), |a, b| a / b);

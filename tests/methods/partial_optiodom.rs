@@ -1,6 +1,7 @@
 //! Circles of a real robot (Sousa et al. 2022) calibrated from parts of what was seen: ends alone, positions
 //! alone, and headings alone, against the full calibration.
 
+use std::collections::BTreeMap;
 use std::fs;
 
 use calib::methods::joint::Joint;
@@ -39,12 +40,14 @@ fn combined(found: &Calibration, by: [f64; 3]) -> (f64, f64) {
 }
 
 #[test]
+#[expect(clippy::print_stdout, reason = "docs/real-robots.md shows what it prints")]
 fn circles_of_june_from_ends_positions_or_headings_agree_with_the_full_calibration() {
     let Some(folder) = real_data("circles in part", "optiodom/diff/circular") else { return };
     let mut sessions: Vec<_> =
         fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path()).collect();
     sessions.sort();
     let mut compared = 0;
+    let mut off: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
     // Every second one: a fit of all poses takes a second.
     for session in sessions.iter().filter(|path| path.is_dir()).step_by(2) {
         let mut imported = importer("optiodom").expect("the importer").read(session).expect("a session");
@@ -65,6 +68,7 @@ fn circles_of_june_from_ends_positions_or_headings_agree_with_the_full_calibrati
             for by in of {
                 let ((a, sigma_a), (b, sigma_b)) = (combined(&full, by), combined(&part, by));
                 let sigma = sigma_a.hypot(sigma_b);
+                off.entry(name).or_default().push((a - b) / sigma);
                 assert!(
                     (a - b).abs() < MAX_SIGMAS * sigma,
                     "{} {name} {by:?}: {b} ± {sigma_b}, not {a} ± {sigma_a}",
@@ -75,6 +79,16 @@ fn circles_of_june_from_ends_positions_or_headings_agree_with_the_full_calibrati
         }
     }
     assert!(compared >= 12, "{compared}");
+    for (name, off) in off {
+        let squares: f64 = off.iter().map(|z| z * z).sum();
+        let largest = off.iter().fold(0.0_f64, |most, z| most.max(z.abs()));
+        let within = off.iter().filter(|z| z.abs() < 1.96).count();
+        let rms = (squares / off.len() as f64).sqrt();
+        println!(
+            "{name}: {} differences, RMS {rms:.2} and at most {largest:.2} standard deviations, {within} within 1.96",
+            off.len()
+        );
+    }
 }
 
 fn with_runs(dataset: &Dataset, of: impl Fn(&[TruthSample]) -> Vec<TruthSample>) -> Dataset {

@@ -13,7 +13,7 @@ use kinematics::Wheels;
 use crate::model::Model;
 use crate::partial_observation::{Observation, Place, Quantity};
 use crate::segment::{Segment, Start};
-use crate::settings::{GYRO_WINDOW_S, MIN_STANDING_PAIRS, TIME_TOLERANCE_S};
+use crate::settings::{GYRO_WINDOW_S, MIN_LIDAR_TURN_RAD, MIN_STANDING_PAIRS, TIME_TOLERANCE_S};
 use crate::wall_start::WallStart;
 use crate::wheel_angles::WheelAngleInterpolator;
 
@@ -77,7 +77,8 @@ pub(crate) fn partial_segments<'a>(
     nominal: &Model,
     (gyro, lidar): (&GyroSettings, Option<LidarExtrinsics>),
 ) -> Vec<PartialSegment<'a>> {
-    let (mut timed, walls) = tape_and_walls(run.run());
+    let shows_distances = lidar.is_none() || turned_rad(track, nominal) >= MIN_LIDAR_TURN_RAD;
+    let (mut timed, walls) = tape_and_walls(run.run(), shows_distances);
     timed.extend(gyro.windows(run, track));
     if timed.is_empty() || poses.iter().any(Segment::is_displacement) {
         return Vec::new();
@@ -142,8 +143,19 @@ pub(crate) fn partial_segments<'a>(
     parts.into_iter().map(of_part).filter(|of| of.partial_measurements() > 0).collect()
 }
 
-/// What tape measures and walls say, and how many walls there are.
-fn tape_and_walls(run: &Run) -> (Vec<Timed>, usize) {
+/// Range of a run's headings by the nominal wheels, radians.
+fn turned_rad(track: &WheelAngleInterpolator<'_>, nominal: &Model) -> f64 {
+    let turns = track.turns();
+    let headings_rad =
+        turns.left.iter().zip(&turns.right).map(|(&left, &right)| nominal.increment(Wheels { left, right }).turn_rad);
+    let (least, most) =
+        headings_rad.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), rad| (least.min(rad), most.max(rad)));
+    (most - least).max(0.0)
+}
+
+/// What tape measures and walls say, and how many walls there are. Distances from walls count if the run
+/// shows them.
+fn tape_and_walls(run: &Run, shows_distances: bool) -> (Vec<Timed>, usize) {
     let mut timed = Vec::new();
     for of in &run.revisits {
         let components = [(of.dx_m, of.sigma_xy_m), (of.dy_m, of.sigma_xy_m), (of.dtheta_rad, of.sigma_theta_rad)];
@@ -176,7 +188,8 @@ fn tape_and_walls(run: &Run) -> (Vec<Timed>, usize) {
             variance: sigma * sigma,
         };
         timed.extend(of.heading_rad.zip(of.sigma_rad).map(|measured| at(Quantity::WallHeading(wall), measured)));
-        timed.extend(of.distance_m.zip(of.sigma_m).map(|measured| at(Quantity::WallDistance(wall), measured)));
+        let distance = of.distance_m.zip(of.sigma_m).filter(|_| shows_distances);
+        timed.extend(distance.map(|measured| at(Quantity::WallDistance(wall), measured)));
     }
     // A heading in the room is one along a wall of an unknown direction.
     let compass = walls.len();

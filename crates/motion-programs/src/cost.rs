@@ -54,6 +54,9 @@ impl DriveLimits {
 
     fn motion(&self, motion: Motion) -> Cost {
         let (distance_m, turn_rad) = match motion {
+            Motion::SpinAt { turn_rad, speed_m_s } => {
+                return Self { cruise_speed_m_s: speed_m_s, ..*self }.motion(Motion::Spin { turn_rad });
+            }
             Motion::Straight { length_m } => (length_m, 0.0),
             Motion::Spin { turn_rad } => (0.0, turn_rad),
             Motion::Arc { radius_m, turn_rad } => (radius_m * turn_rad.abs(), turn_rad),
@@ -99,6 +102,8 @@ mod tests {
         close(drive_limits().motion(Motion::Straight { length_m: 0.02 }), 2.0 * 0.2, 0.02);
         // A turn on the spot: 0.2 m of wheel a radian.
         close(drive_limits().motion(Motion::Spin { turn_rad: -5.0 }), 4.0 + 0.5, 1.0);
+        // The same at half of the speed.
+        close(drive_limits().motion(Motion::SpinAt { turn_rad: 5.0, speed_m_s: 0.125 }), 8.0 + 0.25, 1.0);
         // The inner wheel turns about its own contact: the outer one goes twice as far as the centre.
         close(drive_limits().motion(Motion::Arc { radius_m: 0.2, turn_rad: -5.0 }), 8.0 + 0.5, 1.0);
         // Inside the contact the inner wheel goes backward: its travel counts all the same.

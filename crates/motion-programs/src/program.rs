@@ -23,6 +23,13 @@ pub enum Motion {
         /// Signed turn, radians, counter-clockwise.
         turn_rad: f64,
     },
+    /// A turn on the spot at a speed of its own.
+    SpinAt {
+        /// Signed turn, radians, counter-clockwise.
+        turn_rad: f64,
+        /// Speed of the wheels' contacts, m/s, instead of the robot's cruise speed.
+        speed_m_s: f64,
+    },
     /// A circular arc of the centre. A robot whose wheel speeds lie on a lattice, as under an HCTL-1100,
     /// drives a radius that is a little off.
     Arc {
@@ -71,6 +78,20 @@ pub enum Schedule {
         /// How many.
         runs: u32,
     },
+    /// Spins at several speeds, from the slowest to the fastest in even steps; at each alternately
+    /// counter-clockwise and clockwise. They tell a wheelbase that depends on the yaw rate.
+    SpinsAtSpeeds {
+        /// Nominal turn of each, radians.
+        turn_rad: f64,
+        /// Lowest speed of the wheels' contacts, m/s.
+        slowest_m_s: f64,
+        /// Highest speed of the wheels' contacts, m/s.
+        fastest_m_s: f64,
+        /// How many speeds, two or more.
+        speeds: u32,
+        /// How many in each direction at each speed.
+        runs_each_way: u32,
+    },
     /// UMBmark squares, alternately clockwise and counter-clockwise (Borenstein & Feng 1995: five in each
     /// direction).
     Squares {
@@ -112,18 +133,22 @@ impl Schedule {
     pub fn runs(&self) -> u64 {
         match *self {
             Self::Straights { runs, .. } | Self::Spins { runs, .. } | Self::ValidationPath { runs, .. } => runs.into(),
+            Self::SpinsAtSpeeds { speeds, runs_each_way, .. } => 2 * u64::from(speeds) * u64::from(runs_each_way),
             Self::Squares { runs_each_way, .. } | Self::Circles { runs_each_way, .. } => 2 * u64::from(runs_each_way),
         }
     }
 
-    /// The same with so many runs in each direction; twice as many of a validation path, which has one.
+    /// The same with so many runs in each direction, at each speed where there are several; twice as many of
+    /// a validation path, which has one direction.
     #[must_use]
     pub fn with_pairs(mut self, pairs: u32) -> Self {
         match &mut self {
             Self::Straights { runs, .. } | Self::Spins { runs, .. } | Self::ValidationPath { runs, .. } => {
                 *runs = pairs.saturating_mul(2);
             }
-            Self::Squares { runs_each_way, .. } | Self::Circles { runs_each_way, .. } => *runs_each_way = pairs,
+            Self::SpinsAtSpeeds { runs_each_way, .. }
+            | Self::Squares { runs_each_way, .. }
+            | Self::Circles { runs_each_way, .. } => *runs_each_way = pairs,
         }
         self
     }
@@ -146,6 +171,18 @@ impl Schedule {
                     program("spin", run, Protocol::Spin, settings, vec![Motion::Spin { turn_rad }])
                 })
                 .collect(),
+            Self::SpinsAtSpeeds { turn_rad, slowest_m_s, fastest_m_s, speeds, runs_each_way } => {
+                let step_m_s = (fastest_m_s - slowest_m_s) / f64::from(speeds.saturating_sub(1).max(1));
+                let of_each = 2 * runs_each_way;
+                (0..speeds * of_each)
+                    .map(|run| {
+                        let turn_rad = if run % 2 == 0 { turn_rad } else { -turn_rad };
+                        let speed_m_s = slowest_m_s + step_m_s * f64::from(run / of_each);
+                        let settings = ProtocolSettings { turn_rad: Some(turn_rad), ..ProtocolSettings::default() };
+                        program("spin", run, Protocol::Spin, settings, vec![Motion::SpinAt { turn_rad, speed_m_s }])
+                    })
+                    .collect()
+            }
             Self::Squares { side_m, runs_each_way } => {
                 (0..2 * runs_each_way).map(|run| square(run, side_m, run % 2 == 0)).collect()
             }

@@ -25,6 +25,7 @@ use std::collections::BTreeMap;
 use dataset::Dataset;
 
 pub use problem::{Problem, Severity};
+pub use problems::remedies::{Remedy, WouldDetermine};
 use session_check::SessionCheck;
 
 /// What was found of one robot's datasets.
@@ -34,6 +35,8 @@ pub struct Preflight {
     pub problems: Vec<Problem>,
     /// Which parameters of the drive these runs determine.
     pub determined: BTreeMap<&'static str, bool>,
+    /// What would determine the others, beside the same drives; empty where a problem is an error.
+    pub would_determine: Vec<WouldDetermine>,
 }
 
 impl Preflight {
@@ -59,7 +62,12 @@ pub fn check(datasets: &[Dataset]) -> Preflight {
             problems.push(problem);
         }
     }
-    let determined = problems::coverage::determined(&sessions, &mut problems);
+    let coverage = problems::coverage::Coverage::of(&sessions);
+    let determined = problems::coverage::determined(&coverage, &mut problems);
     problems.sort_by_key(|problem| problem.severity);
-    Preflight { problems, determined }
+    let mut found = Preflight { problems, determined, would_determine: Vec::new() };
+    if found.is_ok() {
+        found.would_determine = problems::remedies::found(&sessions, &coverage);
+    }
+    found
 }

@@ -31,6 +31,8 @@ pub(crate) struct RunLog {
 pub(crate) enum Part {
     /// Its length.
     Length,
+    /// Its length along the normal of a wall.
+    WallLength,
     /// Its turn.
     Turn,
     /// Its turn, times the scale of a gyroscope.
@@ -57,7 +59,7 @@ fn partial(run: &Run) -> Vec<PartialRow> {
     }
     for (number, of) in run.walls.iter().enumerate() {
         let Some(before) = run.walls[..number].iter().rev().find(|before| before.wall == of.wall) else { continue };
-        let sigmas = [(before.sigma_rad, of.sigma_rad, Part::Turn), (before.sigma_m, of.sigma_m, Part::Length)];
+        let sigmas = [(before.sigma_rad, of.sigma_rad, Part::Turn), (before.sigma_m, of.sigma_m, Part::WallLength)];
         for (a, b, part) in sigmas {
             rows.extend(a.zip(b).map(|(a, b)| row(before.t_s, of.t_s, part, a.hypot(b))));
         }

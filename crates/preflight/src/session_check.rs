@@ -17,6 +17,8 @@ pub(crate) struct SessionCheck {
     pub(crate) robot: NominalRobot,
     /// Relative standard deviation of the gyroscope's scale, where it is stated.
     pub(crate) gyro_scale_sigma: Option<f64>,
+    /// Are readings of walls those of a lidar whose place on the robot is not known?
+    pub(crate) has_lidar: bool,
     pub(crate) runs: Vec<RunLog>,
     pub(crate) problems: Vec<Problem>,
     pub(crate) matched: Option<Matched>,
@@ -41,7 +43,8 @@ impl SessionCheck {
         let runs: Vec<RunLog> = session.runs.iter().filter_map(|run| RunLog::of(run, &dataset.robot)).collect();
         let name = session.name.to_owned();
         let gyro_scale_sigma = dataset.truth_noise.gyro.scale_sigma;
-        Self { name, robot: dataset.robot, gyro_scale_sigma, runs, problems: Vec::new(), matched: None }
+        let has_lidar = dataset.truth_noise.lidar.is_some();
+        Self { name, robot: dataset.robot, gyro_scale_sigma, has_lidar, runs, problems: Vec::new(), matched: None }
     }
 
     pub(crate) fn m_per_rad(&self) -> Wheels<f64> {

@@ -219,6 +219,39 @@ pub(crate) const STANDING_M: f64 = 0.02;
 /// Convention: nominal values are as good.
 pub(crate) const DETERMINED_SIGMA: f64 = 0.05;
 
+/// Metres. Standard deviation of a distance by tape measure.
+/// Convention: a mark of a pencil at both ends.
+pub(crate) const TAPE_SIGMA_M: f64 = 2e-3;
+
+/// Metres. Least length of a straight that is worth a tape.
+/// Budgeted: a tape is then good to 1 %.
+pub(crate) const MIN_TAPED_M: f64 = 0.2;
+
+/// Radians. Standard deviation of a heading against a mark on the floor.
+/// Convention: 2 mm over the length of a robot.
+pub(crate) const MARK_SIGMA_RAD: f64 = 5e-3;
+
+/// Radians. Standard deviation of a turn by a lidar's readings of a wall.
+/// Convention: what scans of 1 cm make of a wall of some metres.
+pub(crate) const WALL_SIGMA_RAD: f64 = 2e-3;
+
+/// Metres. Standard deviation of the distance driven towards a wall.
+/// Convention: as above.
+pub(crate) const WALL_SIGMA_M: f64 = 5e-3;
+
+/// Metres. Standard deviation of a position from outside.
+/// Convention: SLAM of a small room; motion capture is better.
+pub(crate) const POSE_SIGMA_M: f64 = 0.02;
+
+/// Radians. Standard deviation of a heading from outside.
+/// Convention: as above.
+pub(crate) const POSE_SIGMA_RAD: f64 = 0.02;
+
+/// Radians. Least range of a run's headings in which a lidar whose place on the robot is not known measures
+/// lengths.
+/// Derived: as MIN_LIDAR_TURN_RAD of the estimator.
+pub(crate) const MIN_LIDAR_TURN_RAD: f64 = 1.0;
+
 /// Ratio of a gap in a log to its median row, from which on it is said.
 /// Budgeted: an operating system delays by less.
 pub(crate) const GAP_RATIO: f64 = 10.0;

@@ -134,7 +134,7 @@ impl Budget {
                 let radius_m = radius_m.min(0.5 * free(shorter_m, 2.0 * SHORTEST_RUN_M)?);
                 Ok(Schedule::Circles { radius_m, turns, runs_each_way })
             }
-            Schedule::Spins { .. } => Ok(schedule),
+            Schedule::Spins { .. } | Schedule::SpinsAtSpeeds { .. } => Ok(schedule),
             Schedule::ValidationPath { .. } => Err(NoFit::ValidationPath),
         }
     }
@@ -291,7 +291,8 @@ mod tests {
                 for motion in &program.motions {
                     let (distance_m, turn_rad) = match *motion {
                         motion_programs::Motion::Straight { length_m } => (length_m, 0.0),
-                        motion_programs::Motion::Spin { turn_rad } => (0.0, turn_rad),
+                        motion_programs::Motion::Spin { turn_rad }
+                        | motion_programs::Motion::SpinAt { turn_rad, .. } => (0.0, turn_rad),
                         motion_programs::Motion::Arc { radius_m, turn_rad } => (radius_m * turn_rad.abs(), turn_rad),
                         motion_programs::Motion::Measure => continue,
                         motion_programs::Motion::Pause { .. } => panic!("no such motion in these protocols"),

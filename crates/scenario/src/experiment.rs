@@ -13,6 +13,7 @@ use crate::limits::{LENGTHS_M, MAX_RUNS};
 use crate::robot::Robot;
 use crate::slam::Slam;
 use crate::sweep::Sweep;
+use crate::wall::Wall;
 
 /// An experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -154,6 +155,8 @@ pub enum Instrument {
         /// Standard deviation of each distance, metres.
         sigma_m: f64,
     },
+    /// A lidar in front of a straight wall (`wall.csv`).
+    Wall(Wall),
     /// Marks of where a run began: the pose of the robot that has come back to it, seen from there
     /// (`revisit.csv`).
     Revisit {
@@ -298,6 +301,22 @@ impl Scenario {
                     range("instrument.still_s", still_s, (0.0..=1e3).contains(&still_s), "from 0 to 1000 s")?;
                 }
                 Instrument::Tape { sigma_m } => positive("instrument.sigma_m", sigma_m)?,
+                Instrument::Wall(wall) => {
+                    interval("1 / instrument.rate_hz", 1.0 / wall.rate_hz)?;
+                    not_negative("instrument.sigma_m", wall.sigma_m)?;
+                    not_negative("instrument.sigma_rad", wall.sigma_rad)?;
+                    positive("instrument.sigma_m + instrument.sigma_rad", wall.sigma_m + wall.sigma_rad)?;
+                    length("instrument.range_m", wall.range_m)?;
+                    length("instrument.wall_distance_m", wall.wall_distance_m)?;
+                    wall.finite().into_iter().try_for_each(|(key, value)| finite(key, value))?;
+                    range("instrument.still_s", wall.still_s, (0.0..=1e3).contains(&wall.still_s), "from 0 to 1000 s")?;
+                    let is_elsewhere =
+                        |of: &Instrument| matches!(of, Instrument::Wall(of) if of.lever() != wall.lever());
+                    if self.instruments.iter().any(is_elsewhere) {
+                        let message = "two walls with different lever_x_m, lever_y_m or lever_theta_rad: one lidar sees all walls";
+                        return Err(ScenarioError::Toml { location: location.to_owned(), message: message.to_owned() });
+                    }
+                }
                 Instrument::Revisit { sigma_xy_m, sigma_theta_rad } => {
                     not_negative("instrument.sigma_xy_m", sigma_xy_m)?;
                     not_negative("instrument.sigma_theta_rad", sigma_theta_rad)?;
@@ -361,6 +380,13 @@ fn check_schedules(location: &str, key: &str, schedules: &[Schedule]) -> Result<
             Schedule::Straights { length_m, .. } => length("length_m", length_m)?,
             Schedule::Spins { turn_rad, .. } => {
                 range("turn_rad", turn_rad, (1e-3..=1e4).contains(&turn_rad), "from 0.001 to 10000 rad")?;
+            }
+            Schedule::SpinsAtSpeeds { turn_rad, slowest_m_s, fastest_m_s, speeds, .. } => {
+                range("turn_rad", turn_rad, (1e-3..=1e4).contains(&turn_rad), "from 0.001 to 10000 rad")?;
+                range("slowest_m_s", slowest_m_s, (1e-3..=1e2).contains(&slowest_m_s), "from 0.001 to 100")?;
+                let holds = fastest_m_s > slowest_m_s && fastest_m_s <= 1e2;
+                range("fastest_m_s", fastest_m_s, holds, "above slowest_m_s, and 100 at most")?;
+                range("speeds", f64::from(speeds), (2..=100).contains(&speeds), "from 2 to 100")?;
             }
             Schedule::Squares { side_m, .. } => length("side_m", side_m)?,
             Schedule::Circles { radius_m, turns, .. } => {

@@ -17,6 +17,7 @@ mod robot;
 mod shipped;
 mod slam;
 mod sweep;
+mod wall;
 
 pub use axis::{Level, Levels, Range, Scale};
 pub use budget::Budget;
@@ -29,3 +30,4 @@ pub use robot::{ControlMode, Controller, Encoder, Mark, Motor, QUADRATURE_DECODI
 pub use shipped::{MOTION_CAPTURE, PAPER};
 pub use slam::Slam;
 pub use sweep::{Case, Sobol, Sweep};
+pub use wall::Wall;

@@ -46,12 +46,23 @@ impl Scenario {
             programs.extend(schedule.programs());
             number_on(&mut programs, before);
         }
-        let still_s = self.instruments.iter().find_map(|instrument| match *instrument {
-            Instrument::Gyro { still_s, .. } if still_s > 0.0 => Some(still_s),
-            _ => None,
-        });
-        if let Some(duration_s) = still_s {
-            programs.iter_mut().for_each(|program| program.motions.insert(0, Motion::Pause { duration_s }));
+        let (mut before_s, mut after_s) = (0.0_f64, 0.0_f64);
+        for instrument in &self.instruments {
+            match instrument {
+                Instrument::Gyro { still_s, .. } => before_s = before_s.max(*still_s),
+                Instrument::Wall(wall) => {
+                    (before_s, after_s) = (before_s.max(wall.still_s), after_s.max(wall.still_s));
+                }
+                _ => {}
+            }
+        }
+        for motions in programs.iter_mut().map(|program| &mut program.motions) {
+            if before_s > 0.0 {
+                motions.insert(0, Motion::Pause { duration_s: before_s });
+            }
+            if after_s > 0.0 {
+                motions.push(Motion::Pause { duration_s: after_s });
+            }
         }
         Ok(programs)
     }

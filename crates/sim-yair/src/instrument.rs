@@ -1,12 +1,13 @@
 //! The instruments: the paper's floor grid, motion capture, poses in a map, a tachometer beside each wheel, a
-//! gyroscope, a tape measure, and marks of where a run began.
+//! gyroscope, a tape measure, a lidar in front of a wall, and marks of where a run began.
 
 use dataset::{
-    ExtraChannel, MarkedPoint, PointReading, Revisit, Run, TapeDistance, TruthSample, TruthSigma, WheelSpeed,
+    ExtraChannel, MarkedPoint, PointReading, Revisit, Run, TapeDistance, TruthSample, TruthSigma, WallReading,
+    WheelSpeed,
 };
 use effects::{Address, Stream, StreamName};
 use kinematics::{Frame, Point, Pose, Wheels, wrap_to_pi};
-use scenario::{Instrument, Slam};
+use scenario::{Instrument, Slam, Wall};
 
 use crate::slam::SlamErrors;
 
@@ -19,6 +20,8 @@ const READING: StreamName = StreamName::new("instrument reading");
 #[derive(Debug)]
 pub(crate) struct Observer {
     instrument: Instrument,
+    /// Where it stands in the scenario's list.
+    position: u64,
     name: StreamName,
     stream: Stream,
     samples: u32,
@@ -42,6 +45,7 @@ impl Observer {
         let name = READING.nth(position);
         Self {
             instrument,
+            position,
             name,
             stream: address.stream(name),
             samples: 0,
@@ -80,6 +84,7 @@ impl Observer {
             | Instrument::Revisit { .. } => f64::INFINITY,
             Instrument::MotionCapture { rate_hz, .. }
             | Instrument::Slam(Slam { rate_hz, .. })
+            | Instrument::Wall(Wall { rate_hz, .. })
             | Instrument::Tachometer { rate_hz, .. } => f64::from(self.samples) / rate_hz,
         }
     }
@@ -88,7 +93,10 @@ impl Observer {
     pub(crate) const fn free_running(&self) -> bool {
         matches!(
             self.instrument,
-            Instrument::MotionCapture { .. } | Instrument::Slam(_) | Instrument::Tachometer { .. }
+            Instrument::MotionCapture { .. }
+                | Instrument::Slam(_)
+                | Instrument::Wall(_)
+                | Instrument::Tachometer { .. }
         )
     }
 
@@ -106,6 +114,10 @@ impl Observer {
         }
         if let Instrument::Slam(slam) = self.instrument {
             self.pose_in_map(&slam, t_s, world_from_body.pose(), run);
+            return;
+        }
+        if let Instrument::Wall(wall) = self.instrument {
+            self.wall(&wall, t_s, world_from_body, run);
             return;
         }
         let Instrument::MotionCapture {
@@ -129,6 +141,30 @@ impl Observer {
             world_from_marker.y_m + sigma_xy_m * stream.normal(),
             Some(world_from_marker.theta_rad + sigma_theta_rad * stream.normal()),
         ));
+    }
+
+    /// Distance from the wall and heading along it, where the lidar sees it.
+    fn wall(&mut self, wall: &Wall, t_s: f64, world_from_body: Frame, run: &mut Run) {
+        self.samples += 1;
+        let [ahead_m, left_m, turned_rad] = wall.lever();
+        let lidar = world_from_body * Pose::new(ahead_m, left_m, turned_rad);
+        let (sin, cos) = wall.wall_direction_rad.sin_cos();
+        let distance_m = wall.wall_distance_m + sin * lidar.x_m - cos * lidar.y_m;
+        // Drawn whether it is seen or not: what is not seen moves no other draw.
+        let [distance, heading] = self.stream.normals();
+        if distance_m <= 0.0 || distance_m > wall.range_m {
+            return;
+        }
+        let heading_rad = wrap_to_pi(lidar.theta_rad - wall.wall_direction_rad);
+        let measured = |sigma: f64, value: f64| (sigma > 0.0).then_some(value);
+        run.walls.push(WallReading {
+            t_s,
+            wall: format!("wall_{}", self.position),
+            distance_m: measured(wall.sigma_m, distance_m + wall.sigma_m * distance),
+            heading_rad: measured(wall.sigma_rad, wrap_to_pi(heading_rad + wall.sigma_rad * heading)),
+            sigma_m: measured(wall.sigma_m, wall.sigma_m),
+            sigma_rad: measured(wall.sigma_rad, wall.sigma_rad),
+        });
     }
 
     /// A pose in the map, with the standard deviations that its row states.

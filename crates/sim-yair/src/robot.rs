@@ -1,6 +1,8 @@
 //! The simulated robot: a scenario made ready to drive, on one trial of its randomness.
 
-use dataset::{GyroNoise, MapDistortion, MarkedPoint, NominalRobot, Run, RunInfo, TruthNoise, WheelLog};
+use dataset::{
+    GyroNoise, LidarExtrinsics, MapDistortion, MarkedPoint, NominalRobot, Run, RunInfo, TruthNoise, WheelLog,
+};
 use effects::{Address, EffectError, Forward, RunStart, Stream, StreamName};
 use kinematics::{DriveGeometry, GeometryError, Pose, WheelNoise, Wheels};
 use motion_programs::{MotionProgram, Platform};
@@ -308,6 +310,11 @@ impl Platform for SimulatedRobot {
                         bias_walk_radps_per_sqrt_s: known(bias_walk_radps_per_sqrt_s),
                         is_instantaneous: false,
                     };
+                    (0.0, 0.0)
+                }
+                Instrument::Wall(wall) => {
+                    // Its place on the robot is not stated.
+                    noise.lidar = wall.has_lever().then_some(LidarExtrinsics { yaw_rad: None });
                     (0.0, 0.0)
                 }
                 // They see no pose, or state their precision with each measurement.

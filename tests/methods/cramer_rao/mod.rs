@@ -137,7 +137,7 @@ fn reckoned(scenario: &Scenario, motions: &[Motion], diameter_m: Wheels<f64>, se
     motions.iter().fold(Pose::IDENTITY, |pose, motion| {
         let increment = match *motion {
             Motion::Straight { length_m } => Increment { distance_m: length_m, turn_rad: 0.0 },
-            Motion::Spin { turn_rad } => Increment { distance_m: 0.0, turn_rad },
+            Motion::Spin { turn_rad } | Motion::SpinAt { turn_rad, .. } => Increment { distance_m: 0.0, turn_rad },
             Motion::Arc { radius_m, turn_rad } => Increment { distance_m: radius_m * turn_rad.abs(), turn_rad },
             Motion::Pause { .. } | Motion::Measure => Increment::default(),
         };

@@ -23,9 +23,14 @@ pub enum NoBound {
     /// A tachometer measures the wheels, and the bound takes measurements of the pose alone.
     #[error("a tachometer's wheel speeds are no pose measurement: leave the instrument out for a bound")]
     WheelSpeeds,
-    /// Partial measurements have no bound here yet.
-    #[error("a gyro, a tape measure and revisits have no closed bound here")]
+    /// Partial measurements beside poses have no bound here.
+    #[error("a gyro, a tape measure, walls or revisits beside whole poses have no closed bound here")]
     PartialMeasurements,
+    /// Readings of a wall are of a lidar somewhere on the robot.
+    #[error(
+        "the place of the lidar on the robot is unknown, for which there is no closed bound here: set lever_x_m, lever_y_m and lever_theta_rad to 0"
+    )]
+    UnknownLever,
     /// Errors of poses in a map resemble each other.
     #[error("poses of slam have correlated errors, for which there is no closed bound here")]
     CorrelatedErrors,

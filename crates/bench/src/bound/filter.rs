@@ -9,11 +9,12 @@
 //! moments. Slopes go through prediction and update as the state does: D ← ΦD + ∂f/∂β, D ← (I − KH)D.
 
 use kinematics::{Increment, OdometryCovariance, Pose, Side, Wheels, sinc, sinc_derivative};
-use nalgebra::{DMatrix, Matrix3, Matrix3xX, SymmetricEigen, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Matrix4, SymmetricEigen, Vector3};
 
 use super::error::NoBound;
 use super::innovation::LinearizedInnovation;
 use super::model::Model;
+use super::partial::{self, Before};
 use super::timeline::{Event, Timeline, Travel};
 
 /// Where the pose's error stands in the state: three entries.
@@ -42,12 +43,31 @@ pub(super) struct Filter<'a> {
     first_rounding: Wheels<usize>,
     largest_var: Vector3<f64>,
     innovations: Vec<LinearizedInnovation>,
+    /// Where the states of each partial instrument begin, and what it measured last.
+    partial: Vec<(usize, Option<Before>)>,
+    /// Slope of the state in the gyroscope's scale.
+    scale_slope: DVector<f64>,
+    /// What partial measurements tell of the geometry and of that scale.
+    partial_information: Matrix4<f64>,
+}
+
+/// What a run tells.
+pub(super) struct RunInformation {
+    /// What each measurement of a pose adds.
+    pub(super) innovations: Vec<LinearizedInnovation>,
+    /// What partial measurements tell of both diameters, the separation and a gyroscope's scale.
+    pub(super) partial: Matrix4<f64>,
 }
 
 impl<'a> Filter<'a> {
-    pub(super) fn run(model: &'a Model, timeline: &Timeline) -> Result<Vec<LinearizedInnovation>, NoBound> {
+    pub(super) fn run(model: &'a Model, timeline: &Timeline) -> Result<RunInformation, NoBound> {
         let first_rounding = Wheels { left: ROUNDING, right: ROUNDING + timeline.phases.left.len() };
-        let size = first_rounding.right + timeline.phases.right.len();
+        let mut size = first_rounding.right + timeline.phases.right.len();
+        let mut partial = Vec::with_capacity(model.partial.len());
+        for instrument in &model.partial {
+            partial.push((size, None));
+            size += instrument.states();
+        }
         let mut covariance = DMatrix::zeros(size, size);
         for side in Side::BOTH {
             let phases = &timeline.phases[side];
@@ -58,9 +78,15 @@ impl<'a> Filter<'a> {
                 }
             }
         }
+        for (instrument, (first, _)) in model.partial.iter().zip(&partial) {
+            for state in 0..instrument.states() {
+                covariance[(first + state, first + state)] = instrument.first_variance(state);
+            }
+        }
         let mut filter = Self {
             model,
-            lost: true,
+            // Where partial measurements alone say something, poses count from the run's start.
+            lost: model.partial.is_empty(),
             world_from_body: Pose::IDENTITY,
             travel: None,
             covariance,
@@ -68,15 +94,21 @@ impl<'a> Filter<'a> {
             first_rounding,
             largest_var: Vector3::zeros(),
             innovations: Vec::new(),
+            partial,
+            scale_slope: DVector::zeros(size),
+            partial_information: Matrix4::zeros(),
         };
         for event in &timeline.events {
             match *event {
                 Event::Motion(travel) => filter.begin(travel),
                 Event::Drive { share } => filter.drive(share),
-                Event::Measurement { measurement, t_s } => filter.measure(measurement, t_s)?,
+                Event::Measurement { measurement, t_s } => match measurement.checked_sub(model.instruments.len()) {
+                    None => filter.measure(measurement, t_s)?,
+                    Some(partial) => filter.measure_part(partial, t_s)?,
+                },
             }
         }
-        Ok(filter.innovations)
+        Ok(RunInformation { innovations: filter.innovations, partial: filter.partial_information })
     }
 
     /// What is drawn once a motion is drawn anew.
@@ -132,6 +164,8 @@ impl<'a> Filter<'a> {
         // Row k of the state's slope is column k here.
         let pose_slope = &transition * self.slope.transpose() + driven_slope;
         self.slope.columns_mut(POSE, 3).copy_from(&pose_slope.transpose());
+        let of_scale = &transition * &self.scale_slope;
+        self.scale_slope.rows_mut(POSE, 3).copy_from(&of_scale);
         self.world_from_body = self.world_from_body * Increment::from_travel(driven_m, separation_m).arc();
     }
 
@@ -154,6 +188,49 @@ impl<'a> Filter<'a> {
         self.covariance = 0.5 * (&self.covariance + self.covariance.transpose());
         self.slope -= slope.transpose() * gain.transpose();
         Ok(())
+    }
+
+    /// Takes what a partial instrument measures at an instant.
+    fn measure_part(&mut self, number: usize, t_s: f64) -> Result<(), NoBound> {
+        let (first, before) = self.partial[number];
+        let reading = self.model.partial[number].reading(t_s, self.world_from_body, before);
+        if reading.walk > 0.0 {
+            self.covariance[(first, first)] += reading.walk;
+        }
+        let states = self.model.partial[number].states();
+        for scalar in &reading.scalars {
+            let mut by_state = DVector::zeros(self.covariance.nrows());
+            by_state.rows_mut(POSE, 3).copy_from(&scalar.by_pose);
+            (0..states).for_each(|state| by_state[first + state] = scalar.by_states[state]);
+            let by_covariance = &self.covariance * &by_state;
+            let variance = by_state.dot(&by_covariance) + scalar.variance;
+            if variance <= 0.0 {
+                return Err(NoBound::NoError { t_s });
+            }
+            let geometry: Vector3<f64> = &self.slope * &by_state;
+            let of_scale = self.scale_slope.dot(&by_state) + scalar.by_scale;
+            self.partial_information += partial::information(geometry.push(of_scale), variance);
+            let gain = &by_covariance / variance;
+            self.covariance -= &gain * by_covariance.transpose();
+            self.slope -= geometry * gain.transpose();
+            self.scale_slope -= of_scale * &gain;
+        }
+        for (state, part) in reading.copies {
+            self.copy(POSE + part, first + state);
+        }
+        self.partial[number].1 = Some(Before { t_s, world_from_body: self.world_from_body });
+        Ok(())
+    }
+
+    /// A state becomes a copy of another one.
+    fn copy(&mut self, from: usize, to: usize) {
+        let row = self.covariance.row(from).into_owned();
+        self.covariance.set_row(to, &row);
+        let column = self.covariance.column(from).into_owned();
+        self.covariance.set_column(to, &column);
+        let slope = self.slope.column(from).into_owned();
+        self.slope.set_column(to, &slope);
+        self.scale_slope[to] = self.scale_slope[from];
     }
 
     /// The inverse of an innovation's covariance, or `None` where some direction has no error.

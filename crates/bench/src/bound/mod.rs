@@ -10,7 +10,8 @@
 //! can beat it where rounding dominates: who knows the commanded counts needs no recorded ones. Not in it:
 //! whatever the robot has beyond geometry, wheel noise, contact patch and rounding (slip, play, latency,
 //! blunders), so that its harm shows as a ratio above one. Both engines have the same formulas; a stepped
-//! robot also settles after a motion and is seen a few times more.
+//! robot also settles after a motion and is seen a few times more. Of a gyroscope, a tape measure, a wall or
+//! a return the bias, the wall's place and the start are unknown in every run, the scale is the same in all.
 //! Reference: Kay, Fundamentals of Statistical Signal Processing: Estimation Theory, 1993, eq. 3.31; Schweppe
 //! 1965 for the innovations' form.
 
@@ -18,31 +19,33 @@ mod error;
 mod filter;
 mod innovation;
 mod model;
+mod partial;
 mod timeline;
 
 use calib::Parameter;
 use motion_programs::{Motion, MotionProgram};
-use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+use nalgebra::{Matrix3, Matrix4, SymmetricEigen, Vector3};
 use scenario::Scenario;
 
 pub use error::NoBound;
-use filter::Filter;
+use filter::{Filter, RunInformation};
 pub use innovation::LinearizedInnovation;
 use model::Model;
 use timeline::Timeline;
 
 impl LinearizedInnovation {
-    /// The innovations of one run, in order. Its first measurement finds where it starts and is none.
+    /// The innovations of the poses of one run, in order. Its first measurement finds where it starts and is
+    /// none.
     ///
     /// # Errors
     /// [`NoBound`] with the reason.
     pub fn of_run(scenario: &Scenario, program: &MotionProgram) -> Result<Vec<Self>, NoBound> {
-        innovations(&Model::of(scenario)?, &program.motions)
+        Ok(run_information(&Model::of(scenario)?, &program.motions)?.innovations)
     }
 }
 
-/// What the measurements of a run add, one by one.
-fn innovations(model: &Model, motions: &[Motion]) -> Result<Vec<LinearizedInnovation>, NoBound> {
+/// What the measurements of a run tell.
+fn run_information(model: &Model, motions: &[Motion]) -> Result<RunInformation, NoBound> {
     Filter::run(model, &Timeline::of(model, motions))
 }
 
@@ -85,11 +88,13 @@ impl FisherInformation {
                 None => kinds.push((program, 1.0)),
             }
         }
-        let mut matrix = Matrix3::zeros();
+        let (mut matrix, mut in_part) = (Matrix3::zeros(), Matrix4::zeros());
         for (program, runs) in kinds {
-            let innovations = innovations(&model, &program.motions)?;
+            let RunInformation { innovations, partial } = run_information(&model, &program.motions)?;
             matrix += runs * innovations.iter().map(LinearizedInnovation::information).sum::<Matrix3<f64>>();
+            in_part += runs * partial;
         }
+        matrix += partial::without_scale(in_part, model.scale_sigma);
         let diameter_m = model.geometry.wheel_diameter_m();
         Ok(Self {
             matrix,

@@ -13,6 +13,7 @@ use nalgebra::{Matrix2x3, Matrix3, Vector3};
 use scenario::{Engine, Instrument, Robot, Scenario};
 
 use super::error::NoBound;
+use super::partial::PartialInstrument;
 
 /// Readings must err by this share of what they are rounded to, for their roundings to be independent to 1 %.
 const MIN_DITHER: f64 = 1.0 / 3.0;
@@ -30,8 +31,11 @@ pub(super) struct Model {
     pub(super) separation_var_m2: f64,
     /// Controller counts in a recorded tick.
     pub(super) counts_per_tick: u32,
-    /// The instruments.
+    /// The instruments that see poses, or those that measure parts of them.
     pub(super) instruments: Vec<PoseInstrument>,
+    pub(super) partial: Vec<PartialInstrument>,
+    /// Standard deviation of a gyroscope's scale that the dataset states; 0 = none.
+    pub(super) scale_sigma: f64,
     /// Whether speed is ramped up and down at the commanded acceleration, and not constant.
     pub(super) ramps: bool,
     robot: Robot,
@@ -41,14 +45,23 @@ pub(super) struct Model {
 impl Model {
     pub(super) fn of(scenario: &Scenario) -> Result<Self, NoBound> {
         let points = scenario.robot.marked_points();
-        let instruments: Vec<PoseInstrument> = scenario
-            .instruments
-            .iter()
-            .map(|instrument| PoseInstrument::of(instrument, &points))
-            .collect::<Result<_, _>>()?;
-        if instruments.is_empty() {
+        let (mut instruments, mut partial) = (Vec::new(), Vec::new());
+        for instrument in &scenario.instruments {
+            match PartialInstrument::of(instrument, scenario.log) {
+                Some(of) => partial.push(of?),
+                None => instruments.push(PoseInstrument::of(instrument, &points)?),
+            }
+        }
+        if instruments.is_empty() && partial.is_empty() {
             return Err(NoBound::NoInstrument);
         }
+        if !instruments.is_empty() && !partial.is_empty() {
+            return Err(NoBound::PartialMeasurements);
+        }
+        let scale_sigma = scenario.instruments.iter().find_map(|instrument| match *instrument {
+            Instrument::Gyro { scale_sigma, .. } => Some(scale_sigma),
+            _ => None,
+        });
         let (mut separation_var_m2, mut counts_per_tick, mut on_speed) = (0.0, 1, false);
         for effect in &scenario.effects {
             let unclosed = |why| NoBound::Effect { id: effect.id(), why };
@@ -65,10 +78,36 @@ impl Model {
             separation_var_m2,
             counts_per_tick,
             instruments,
+            partial,
+            scale_sigma: scale_sigma.unwrap_or(0.0),
             ramps: on_speed || scenario.engine != Engine::ClosedForm,
             robot: scenario.robot.clone(),
             nominal_geometry: scenario.nominal_geometry()?,
         })
+    }
+
+    /// How many instruments there are: those that see poses first.
+    pub(super) const fn measurements(&self) -> usize {
+        self.instruments.len() + self.partial.len()
+    }
+
+    /// Measurements per second of an instrument while time passes; `None` for one that reads the standing
+    /// robot alone.
+    pub(super) fn rate_hz(&self, measurement: usize) -> Option<f64> {
+        match self.instruments.get(measurement) {
+            Some(of) => of.rate_hz,
+            None => self.partial.get(measurement - self.instruments.len())?.rate_hz(),
+        }
+    }
+
+    /// Does an instrument read the standing robot?
+    pub(super) fn reads_standing(&self, measurement: usize) -> bool {
+        match self.instruments.get(measurement) {
+            Some(of) => of.rate_hz.is_none(),
+            None => {
+                self.partial.get(measurement - self.instruments.len()).is_some_and(PartialInstrument::reads_standing)
+            }
+        }
     }
 
     /// Recorded ticks of a wheel turn.
@@ -88,11 +127,17 @@ impl Model {
         travel_m.zip_with(self.nominal_m_per_count(), |travel_m, m_per_count| (travel_m / m_per_count).round())
     }
 
-    /// Speed and acceleration of the wheel with more counts to go, counts/s and counts/s².
-    pub(super) fn speed_and_acceleration_of_counts(&self, counts: Wheels<f64>) -> (f64, f64) {
+    /// Speed of a wheel's contact that motions are commanded with, m/s.
+    pub(super) const fn cruise_speed_m_s(&self) -> f64 {
+        self.robot.cruise_speed_m_s
+    }
+
+    /// Speed and acceleration of the wheel with more counts to go, counts/s and counts/s², where its contact
+    /// goes at a speed, m/s.
+    pub(super) fn speed_and_acceleration_of_counts(&self, counts: Wheels<f64>, speed_m_s: f64) -> (f64, f64) {
         let m_per_count = self.nominal_m_per_count();
         let longest = counts.left.abs().max(counts.right.abs());
-        let speed = |counts: f64, m_per_count: f64| self.robot.cruise_speed_m_s / m_per_count * counts.abs() / longest;
+        let speed = |counts: f64, m_per_count: f64| speed_m_s / m_per_count * counts.abs() / longest;
         let speeds = counts.zip_with(m_per_count, speed);
         (speeds.left.max(speeds.right), self.robot.acceleration_m_s2 / m_per_count.left)
     }
@@ -139,7 +184,7 @@ impl PoseInstrument {
             }
             Instrument::Slam(_) => Err(NoBound::CorrelatedErrors),
             Instrument::Tachometer { .. } => Err(NoBound::WheelSpeeds),
-            Instrument::Gyro { .. } | Instrument::Tape { .. } | Instrument::Revisit { .. } => {
+            Instrument::Gyro { .. } | Instrument::Tape { .. } | Instrument::Wall(_) | Instrument::Revisit { .. } => {
                 Err(NoBound::PartialMeasurements)
             }
         }

@@ -59,21 +59,23 @@ impl Timeline {
             model,
             timeline: Self { events: Vec::new(), phases: Wheels::both(vec![0]) },
             t_s: 0.0,
-            measurements: vec![0; model.instruments.len()],
+            measurements: vec![0; model.measurements()],
             last_standing_s: None,
             counts: Wheels::both(0),
             phase: Wheels::both(0),
         };
         run.measure_until(0.0, None);
         run.stand();
+        let cruise_m_s = model.cruise_speed_m_s();
         for motion in motions {
             match *motion {
                 Motion::Measure => run.stand(),
                 Motion::Pause { duration_s } => run.pass(duration_s, None),
-                Motion::Straight { length_m } => run.go(Increment { distance_m: length_m, turn_rad: 0.0 }),
-                Motion::Spin { turn_rad } => run.go(Increment { distance_m: 0.0, turn_rad }),
+                Motion::Straight { length_m } => run.go(Increment { distance_m: length_m, turn_rad: 0.0 }, cruise_m_s),
+                Motion::Spin { turn_rad } => run.go(Increment { distance_m: 0.0, turn_rad }, cruise_m_s),
+                Motion::SpinAt { turn_rad, speed_m_s } => run.go(Increment { distance_m: 0.0, turn_rad }, speed_m_s),
                 Motion::Arc { radius_m, turn_rad } => {
-                    run.go(Increment { distance_m: radius_m * turn_rad.abs(), turn_rad });
+                    run.go(Increment { distance_m: radius_m * turn_rad.abs(), turn_rad }, cruise_m_s);
                 }
             }
         }
@@ -101,20 +103,18 @@ impl Run<'_> {
             return;
         }
         self.last_standing_s = Some(self.t_s);
-        for (measurement, instrument) in self.model.instruments.iter().enumerate() {
-            if instrument.rate_hz.is_none() {
-                self.timeline.events.push(Event::Measurement { measurement, t_s: self.t_s });
-            }
+        for measurement in (0..self.measurements.len()).filter(|of| self.model.reads_standing(*of)) {
+            self.timeline.events.push(Event::Measurement { measurement, t_s: self.t_s });
         }
     }
 
-    fn go(&mut self, increment: Increment) {
+    fn go(&mut self, increment: Increment, speed_m_s: f64) {
         let counts = self.model.commanded_counts(increment);
         let longest = counts.left.abs().max(counts.right.abs());
         if longest <= 0.0 {
             return;
         }
-        let (speed, acceleration) = self.model.speed_and_acceleration_of_counts(counts);
+        let (speed, acceleration) = self.model.speed_and_acceleration_of_counts(counts, speed_m_s);
         let time_scale = TimeScale::of(longest, speed, self.model.ramps.then_some(acceleration));
         let before = self.phase;
         for side in Side::BOTH {
@@ -151,10 +151,7 @@ impl Run<'_> {
         loop {
             let next = (0..self.measurements.len())
                 .filter_map(|measurement| {
-                    Some((
-                        f64::from(self.measurements[measurement]) / self.model.instruments[measurement].rate_hz?,
-                        measurement,
-                    ))
+                    Some((f64::from(self.measurements[measurement]) / self.model.rate_hz(measurement)?, measurement))
                 })
                 .min_by(|a, b| a.0.total_cmp(&b.0));
             let Some((t_s, measurement)) = next.filter(|(t_s, _)| *t_s <= self.t_s + duration_s + SAME_INSTANT_S)

@@ -399,6 +399,7 @@ fn noise(scenario: &Scenario) -> Option<Noise> {
         Instrument::Tachometer { .. }
         | Instrument::Gyro { .. }
         | Instrument::Tape { .. }
+        | Instrument::Wall(_)
         | Instrument::Revisit { .. } => None,
     })?;
     let sigmas = [scenario.noise.wheel_sigma_m_per_sqrt_m, MIN_NOISE_SIGMA, xy_m, theta_rad];

@@ -93,7 +93,7 @@ fn log(program: &MotionProgram, setting: &Setting, speed_m_s: f64, phase_rad: Wh
     for motion in &program.motions {
         let increment = match *motion {
             Motion::Straight { length_m } => Increment { distance_m: length_m, turn_rad: 0.0 },
-            Motion::Spin { turn_rad } => Increment { distance_m: 0.0, turn_rad },
+            Motion::Spin { turn_rad } | Motion::SpinAt { turn_rad, .. } => Increment { distance_m: 0.0, turn_rad },
             Motion::Arc { radius_m, turn_rad } => Increment { distance_m: radius_m * turn_rad.abs(), turn_rad },
             Motion::Pause { duration_s } => {
                 t_s += duration_s;

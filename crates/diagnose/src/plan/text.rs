@@ -19,6 +19,10 @@ fn kind(schedule: &Schedule) -> String {
             let turns = if turns == 1.0 { "a turn".to_owned() } else { format!("{turns:.0} turns") };
             format!("spins of {turns} on the spot, counter-clockwise and clockwise in turn")
         }
+        Schedule::SpinsAtSpeeds { turn_rad, slowest_m_s, fastest_m_s, .. } => {
+            let turns = turn_rad / TAU;
+            format!("spins of {turns:.0} turns on the spot at {slowest_m_s} to {fastest_m_s} m/s, both ways")
+        }
         Schedule::Squares { side_m, .. } => {
             format!("squares with sides of {side_m:.2} m, clockwise and counter-clockwise in turn")
         }
@@ -42,8 +46,15 @@ pub(super) fn direction(schedule: &Schedule, number: usize) -> &'static str {
     match (schedule, number) {
         (Schedule::Straights { .. }, 0) => "forward",
         (Schedule::Straights { .. }, _) => "backward",
-        (Schedule::Spins { .. }, 0) | (Schedule::Squares { .. } | Schedule::Circles { .. }, 1) => "counter-clockwise",
-        (Schedule::Spins { .. } | Schedule::Squares { .. } | Schedule::Circles { .. }, _) => "clockwise",
+        (Schedule::Spins { .. } | Schedule::SpinsAtSpeeds { .. }, 0)
+        | (Schedule::Squares { .. } | Schedule::Circles { .. }, 1) => "counter-clockwise",
+        (
+            Schedule::Spins { .. }
+            | Schedule::SpinsAtSpeeds { .. }
+            | Schedule::Squares { .. }
+            | Schedule::Circles { .. },
+            _,
+        ) => "clockwise",
         (Schedule::ValidationPath { .. }, _) => "validation",
     }
 }
@@ -51,7 +62,7 @@ pub(super) fn direction(schedule: &Schedule, number: usize) -> &'static str {
 const fn noun(schedule: &Schedule) -> &'static str {
     match schedule {
         Schedule::Straights { .. } => "straights",
-        Schedule::Spins { .. } => "spins",
+        Schedule::Spins { .. } | Schedule::SpinsAtSpeeds { .. } => "spins",
         Schedule::Squares { .. } => "squares",
         Schedule::Circles { .. } => "circles",
         Schedule::ValidationPath { .. } => "paths",
@@ -143,7 +154,7 @@ pub(super) fn next_experiment(
         Schedule::Straights { length_m, .. } => [length_m, 0.0],
         Schedule::Squares { side_m, .. } => [side_m, side_m],
         Schedule::Circles { radius_m, .. } => [2.0 * radius_m, 2.0 * radius_m],
-        Schedule::Spins { .. } | Schedule::ValidationPath { .. } => [0.0, 0.0],
+        Schedule::Spins { .. } | Schedule::SpinsAtSpeeds { .. } | Schedule::ValidationPath { .. } => [0.0, 0.0],
     };
     let free_m = parts.iter().map(needs).fold([0.0_f64; 2], |a, b| [a[0].max(b[0]), a[1].max(b[1])]);
     NextExperiment {

@@ -1,6 +1,6 @@
 //! Walls that a lidar sees which stands anywhere on the robot, and readings that are outliers.
 
-use dataset::{Dataset, LidarExtrinsics, Run, TruthSample, WallReading};
+use dataset::{Dataset, LidarExtrinsics, Run, TruthSample, WallReading, WheelLog};
 use kinematics::Pose;
 
 use super::partial::{
@@ -45,6 +45,27 @@ fn a_lidar_anywhere_on_the_robot_determines_it_as_a_nuisance() {
     let fit = fitted(&wrong);
     let is_off = errors(&fit).iter().any(|error| error.abs() > 30.0 * NOISELESS);
     assert!(is_off || !fit.partial_outliers().is_empty(), "{:?}", errors(&fit));
+}
+
+#[test]
+fn a_lidar_of_unknown_yaw_measures_no_length_in_a_straight() {
+    let straights = |lidar: Option<LidarExtrinsics>| {
+        let mut dataset = dataset(NO_GYRO, |run, poses| {
+            seen_by_lidar(run, poses);
+            let last = poses.iter().position(|pose| pose.theta_rad.abs() > 0.5).unwrap_or(poses.len());
+            let end_s = run.odometry.t_s[last - 1];
+            run.walls.retain(|of| of.t_s < end_s);
+            run.odometry.t_s.truncate(last);
+            let WheelLog::Angles(angles) = &mut run.odometry.wheels else { panic!("angles") };
+            angles.left.truncate(last);
+            angles.right.truncate(last);
+        });
+        dataset.truth_noise.lidar = lidar;
+        dataset
+    };
+    let counted = |lidar| fitted(&straights(lidar)).records.partial[0].partial_measurements();
+    // Heading and distance of each reading where they are of the drive's centre, headings alone otherwise.
+    assert_eq!(counted(None), 2 * counted(Some(LidarExtrinsics::default())));
 }
 
 #[test]

@@ -12,13 +12,15 @@ use crate::kind::Kind;
 use crate::problem::{Problem, Severity};
 use crate::run_log::{Part, RunLog};
 use crate::session_check::SessionCheck;
-use crate::settings::{DETERMINED_SIGMA, INSTANTS, MAX_STRAIGHT_TURN_RAD, MIN_DISTANCE_M, MIN_TURNING_RAD, ONE_WAY};
+use crate::settings::{
+    DETERMINED_SIGMA, INSTANTS, MAX_STRAIGHT_TURN_RAD, MIN_DISTANCE_M, MIN_LIDAR_TURN_RAD, MIN_TURNING_RAD, ONE_WAY,
+};
 use crate::windows::Measured;
 
-const PARAMETERS: [&str; 3] = ["left_wheel_diameter_m", "right_wheel_diameter_m", "wheel_separation_m"];
+pub(crate) const PARAMETERS: [&str; 3] = ["left_wheel_diameter_m", "right_wheel_diameter_m", "wheel_separation_m"];
 
 /// Information about the logarithms of left, right and separation.
-type Information = [[f64; 3]; 3];
+pub(crate) type Information = [[f64; 3]; 3];
 
 pub(crate) fn found(check: &mut SessionCheck) {
     let turning = check.turning();
@@ -62,25 +64,46 @@ pub(crate) fn unused(check: &mut SessionCheck) {
     check.problems.push(Problem::new(&Kind::UnusedMeasurements { gyro_alone }, severity, Some(runs), 0.999));
 }
 
-/// Which parameters the sessions determine together; what they do not is a problem.
-pub(crate) fn determined(sessions: &[SessionCheck], problems: &mut Vec<Problem>) -> BTreeMap<&'static str, bool> {
-    let mut information = [[0.0; 3]; 3];
-    let (mut distance, mut turn) = (0.0, 0.0);
-    for session in sessions {
-        add(&mut information, session, &mut distance, &mut turn);
+/// What the sessions tell of the parameters together.
+pub(crate) struct Coverage {
+    pub(crate) information: Information,
+    /// Does nothing but partial measurements see the robot?
+    pub(crate) partial: bool,
+    /// Do the wheels turn the robot more than they drive it?
+    turns: bool,
+}
+
+impl Coverage {
+    pub(crate) fn of(sessions: &[SessionCheck]) -> Self {
+        let mut information = [[0.0; 3]; 3];
+        let (mut distance, mut turn) = (0.0, 0.0);
+        for session in sessions {
+            add(&mut information, session, &mut distance, &mut turn);
+        }
+        let partial = sessions.iter().flat_map(|session| &session.runs).all(RunLog::is_seen_in_part);
+        Self { information, partial, turns: turn > distance }
     }
-    let mut sigma = sigmas(&information);
-    let partial = sessions.iter().flat_map(|session| &session.runs).all(RunLog::is_seen_in_part);
+}
+
+/// Which parameters an information determines.
+pub(crate) fn are_determined(information: &Information, partial: bool) -> [bool; 3] {
+    let mut sigma = sigmas(information);
     if partial && sigma[..2].iter().any(|sigma| *sigma >= DETERMINED_SIGMA) {
         // The wheels then stay as they are stated, and the separation is the one that goes with them.
         sigma[2] = (1.0 + information[2][2]).sqrt().recip();
     }
+    sigma.map(|sigma| sigma < DETERMINED_SIGMA)
+}
+
+/// Which parameters the sessions determine together; what they do not is a problem.
+pub(crate) fn determined(coverage: &Coverage, problems: &mut Vec<Problem>) -> BTreeMap<&'static str, bool> {
+    let Coverage { information, partial, turns } = coverage;
     let determined: BTreeMap<&'static str, bool> =
-        PARAMETERS.iter().zip(sigma).map(|(name, sigma)| (*name, sigma < DETERMINED_SIGMA)).collect();
+        PARAMETERS.into_iter().zip(are_determined(information, *partial)).collect();
     let missing: Vec<&'static str> = PARAMETERS.into_iter().filter(|name| !determined[name]).collect();
     let is_wrong = problems.iter().any(|problem| problem.severity == Severity::Error);
     if !missing.is_empty() && !is_wrong {
-        let kind = Kind::NotDetermined { parameters: missing, turns: turn > distance, partial };
+        let kind = Kind::NotDetermined { parameters: missing, turns: *turns, partial: *partial };
         problems.push(Problem::new(&kind, Severity::Warning, None, 0.95));
     }
     determined
@@ -107,14 +130,41 @@ fn sigmas(information: &Information) -> [f64; 3] {
     [0, 1, 2].map(|row| rows[row][3 + row].sqrt())
 }
 
-fn add(information: &mut Information, session: &SessionCheck, distance: &mut f64, turn: &mut f64) {
-    let mut row = |gradient: [f64; 3], sigma: f64| {
-        for (a, line) in information.iter_mut().enumerate() {
-            for (b, cell) in line.iter_mut().enumerate() {
-                *cell += gradient[a] * gradient[b] / (sigma * sigma);
-            }
+/// Adds what a scalar of a gradient and a standard deviation tells.
+pub(crate) fn add_row(information: &mut Information, gradient: [f64; 3], sigma: f64) {
+    for (a, line) in information.iter_mut().enumerate() {
+        for (b, cell) in line.iter_mut().enumerate() {
+            *cell += gradient[a] * gradient[b] / (sigma * sigma);
         }
+    }
+}
+
+/// How far the wheels' contacts go between two rows by the nominal robot, metres, and how far it turns by
+/// them, radians.
+pub(crate) fn travel(
+    run: &RunLog,
+    (from, to): (usize, usize),
+    m_per_rad: Wheels<f64>,
+    separation_m: f64,
+) -> (Wheels<f64>, f64) {
+    let turned = Wheels {
+        left: run.wheels.left[to] - run.wheels.left[from],
+        right: run.wheels.right[to] - run.wheels.right[from],
     };
+    let travel_m = turned.zip_with(m_per_rad, |rad, m| rad * m);
+    (travel_m, (travel_m.right - travel_m.left) / separation_m)
+}
+
+/// Gradients of a length and of a turn by the logarithms of the parameters.
+pub(crate) fn gradients(travel_m: Wheels<f64>, turn_rad: f64, separation_m: f64) -> [[f64; 3]; 2] {
+    [
+        [0.5 * travel_m.left, 0.5 * travel_m.right, 0.0],
+        [-travel_m.left / separation_m, travel_m.right / separation_m, -turn_rad],
+    ]
+}
+
+fn add(information: &mut Information, session: &SessionCheck, distance: &mut f64, turn: &mut f64) {
+    let mut row = |gradient: [f64; 3], sigma: f64| add_row(information, gradient, sigma);
     let m_per_rad = session.m_per_rad();
     let separation_m = session.robot.wheel_separation_m;
     if let Some(matched) = session.matched.as_ref().filter(|matched| matched.measured == Measured::Poses) {
@@ -144,7 +194,7 @@ fn add(information: &mut Information, session: &SessionCheck, distance: &mut f64
     let Ok(geometry) = session.robot.geometry() else { return };
     for run in &session.runs {
         add_ends(run, &geometry, &mut row);
-        add_partial(run, m_per_rad, separation_m, session.gyro_scale_sigma, &mut row);
+        add_partial(run, session, &mut row);
         if !has_windows {
             let turned = run.turning().zip_with(m_per_rad, |rad, m| rad * m);
             *distance += 0.5 * (turned.left + turned.right);
@@ -154,31 +204,34 @@ fn add(information: &mut Information, session: &SessionCheck, distance: &mut f64
 
 /// What tapes, walls, returns and a gyroscope tell of a run. A gyroscope of unknown scale tells the ratio
 /// of the wheels where the robot hardly turns, and nothing of how far it turns else.
-fn add_partial(
-    run: &RunLog,
-    m_per_rad: Wheels<f64>,
-    separation_m: f64,
-    gyro_scale_sigma: Option<f64>,
-    row: &mut impl FnMut([f64; 3], f64),
-) {
+fn add_partial(run: &RunLog, session: &SessionCheck, row: &mut impl FnMut([f64; 3], f64)) {
+    let (m_per_rad, separation_m) = (session.m_per_rad(), session.robot.wheel_separation_m);
+    // Where it hardly turns the yaw of a lidar is not known, nor how obliquely it drives at a wall.
+    let shows_wall_lengths =
+        !session.has_lidar || heading_range_rad(run, m_per_rad, separation_m) >= MIN_LIDAR_TURN_RAD;
     let at = |t_s: f64| run.t_s.partition_point(|row_s| *row_s <= t_s).saturating_sub(1);
     for of in &run.partial {
         let (from, to) = (at(of.from_s), at(of.to_s));
-        let turned = Wheels {
-            left: run.wheels.left[to] - run.wheels.left[from],
-            right: run.wheels.right[to] - run.wheels.right[from],
-        };
-        let travel_m = turned.zip_with(m_per_rad, |rad, m| rad * m);
-        let turn_rad = (travel_m.right - travel_m.left) / separation_m;
-        let by_turn = [-travel_m.left / separation_m, travel_m.right / separation_m, -turn_rad];
-        match (of.part, gyro_scale_sigma) {
-            (Part::Length, _) => row([0.5 * travel_m.left, 0.5 * travel_m.right, 0.0], of.sigma),
+        let (travel_m, turn_rad) = travel(run, (from, to), m_per_rad, separation_m);
+        let [by_length, by_turn] = gradients(travel_m, turn_rad, separation_m);
+        match (of.part, session.gyro_scale_sigma) {
+            (Part::Length, _) => row(by_length, of.sigma),
+            (Part::WallLength, _) if shows_wall_lengths => row(by_length, of.sigma),
+            (Part::WallLength, _) => {}
             (Part::Turn, _) => row(by_turn, of.sigma),
             (Part::GyroTurn, Some(scale)) => row(by_turn, of.sigma.hypot(scale * turn_rad)),
             (Part::GyroTurn, None) if turn_rad.abs() < MAX_STRAIGHT_TURN_RAD => row(by_turn, of.sigma),
             (Part::GyroTurn, None) => {}
         }
     }
+}
+
+/// Range of a run's headings by the nominal robot, radians.
+fn heading_range_rad(run: &RunLog, m_per_rad: Wheels<f64>, separation_m: f64) -> f64 {
+    let headings_rad = (0..run.wheels.left.len()).map(|row| travel(run, (0, row), m_per_rad, separation_m).1);
+    let (least, most) =
+        headings_rad.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), rad| (least.min(rad), most.max(rad)));
+    (most - least).max(0.0)
 }
 
 /// What a run's poses or positions tell, seen from the first.
