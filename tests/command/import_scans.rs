@@ -124,8 +124,8 @@ impl Bag {
 }
 
 /// Heading and heading on the wheels at every millisecond: spins of two turns both ways at several speeds,
-/// with standstills of 4 s between them. At a yaw rate ω the contacts are farther apart by `by_rate` |ω|. Each
-/// wheel's travel over the ground wanders by `wheel_sigma`, m/√m.
+/// with standstills of 4 s between them. At a yaw rate ω the contacts are farther apart by `by_rate` |ω|.
+/// Each wheel's travel over the ground wanders by `wheel_sigma`, m/√m.
 fn spins(seed: u64, by_rate: f64, wheel_sigma: f64) -> Vec<[f64; 2]> {
     let mut path = vec![[0.0; 2]; 4000];
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed ^ WHEELS);

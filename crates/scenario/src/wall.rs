@@ -1,5 +1,5 @@
-//! A lidar in front of a straight wall as an instrument: its errors, its place on the robot, and the wall's in
-//! the room.
+//! A lidar in front of a straight wall as an instrument: its errors, its place on the robot, and the wall's
+//! in the room.
 
 use serde::{Deserialize, Serialize};
 
