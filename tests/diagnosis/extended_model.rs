@@ -81,7 +81,8 @@ fn an_extended_model_drifts_on_fresh_runs_as_the_noise_does_and_its_geometry_alo
 }
 
 /// Through the file's text and back, evaluation on the diagnosed runs is the dead reckoning of the model that
-/// carries over, whose first measurement is at the log's first row and whose last one is within the log: seen are 3e-15 m.
+/// carries over, whose first measurement is at the log's first row and whose last one is within the log: seen
+/// are 3e-15 m.
 /// A nanometre is far below what any term does. Seen to reject a held value that is lost: another width of
 /// the backlash moves an end by 1.3e-5 m.
 #[test]

@@ -108,9 +108,10 @@ fn misses(found: &Calibration) -> [f64; 3] {
 }
 
 /// Errors of 10⁻⁵ m and rad over half a metre and a radian are 2·10⁻⁵ of it, and what a method leaves out is
-/// of second order in the robot's errors: 0.4 % of the wheels' ratio and 1 % of the wheelbase, 10⁻⁴. The
-/// nominal robot misses by 2·10⁻³ and 10⁻².
-const TOLERANCE: f64 = 3e-4;
+/// of second order in the robot's errors: 0.4 % of the wheels' ratio and 1 % of the wheelbase, some 10⁻⁴
+/// (UMBmark, which takes sines of corners for their angles, is 3.5·10⁻⁴ off in the wheelbase). The nominal
+/// robot misses by 2·10⁻³ and 10⁻².
+const TOLERANCE: f64 = 5e-4;
 
 #[test]
 fn every_method_gives_an_exact_robot_back() {
