@@ -107,11 +107,12 @@ fn misses(found: &Calibration) -> [f64; 3] {
     ]
 }
 
-/// Errors of 10⁻⁵ m and rad over half a metre and a radian are 2·10⁻⁵ of it, and what a method leaves out is
-/// of second order in the robot's errors: 0.4 % of the wheels' ratio and 1 % of the wheelbase, some 10⁻⁴
-/// (UMBmark, which takes sines of corners for their angles, is 3.5·10⁻⁴ off in the wheelbase). The nominal
-/// robot misses by 2·10⁻³ and 10⁻².
-const TOLERANCE: f64 = 5e-4;
+/// Largest relative errors: measurements that err by 10⁻⁵ m and rad over half a metre and a radian, and for
+/// UMBmark what its equations leave out, of second order in 0.4 % of the wheels' ratio and 1 % of the
+/// wheelbase. The largest of all other methods is 2.2·10⁻⁵, of `direct`. The nominal robot misses by 2·10⁻³
+/// and 10⁻².
+const TOLERANCE: f64 = 4e-5;
+const TOLERANCE_OF_UMBMARK: f64 = 5e-4;
 
 #[test]
 fn every_method_gives_an_exact_robot_back() {
@@ -127,7 +128,8 @@ fn every_method_gives_an_exact_robot_back() {
             assert_eq!(found.geometry.wheel_separation_m(), NOMINAL_SEPARATION_M, "{name}: it is blind to it");
             misses[2] = 0.0;
         }
-        assert!(misses.iter().all(|miss| miss.abs() < TOLERANCE), "{name}: {misses:?}");
+        let most = if name == "umbmark" { TOLERANCE_OF_UMBMARK } else { TOLERANCE };
+        assert!(misses.iter().all(|miss| miss.abs() < most), "{name}: {misses:?}");
         for estimate in found.estimates() {
             let sigma = estimate.sigma.unwrap_or(0.0);
             assert!((0.0..0.01).contains(&sigma), "{name}: {:?} ± {sigma}", estimate.parameter);

@@ -178,7 +178,7 @@ fn stages(datasets: &[Dataset], options: &Options, min_common_clock_s: f64) -> R
     begins(Step::MeanStructure);
     let base = correlated_base(records, base);
     // Stamps that are wrong: everything that comes from them is sought in records that are restamped.
-    let sought = by_counts.is_none() && is_correlated(&base);
+    let sought = by_counts.is_none() && is_correlated(&base, &[]);
     let error = sought.then(|| stamp_error(records, &base, &every_term)).flatten();
     let whole = || by_counts.is_none().then(|| whole_stamp_error(records, &base, &every_term)).flatten();
     let error = error.or_else(whole);
@@ -196,11 +196,12 @@ fn stages(datasets: &[Dataset], options: &Options, min_common_clock_s: f64) -> R
     };
     let is_open = |candidate: &Candidate| stamps.is_none_or(|error| error.candidate.id() != candidate.id());
     let mut catalogue: Vec<Candidate> = every_term.into_iter().filter(is_open).collect();
-    let uncorrelated = (!is_correlated(&base)).then(|| base.clone());
+    let uncorrelated = (!is_correlated(&base, &[])).then(|| base.clone());
     let mut structure = mean_structure(records, base, &catalogue);
     // Where the counts do not follow the robot at all, no small effect has a meaning: only one with which
     // they follow it, such as a clock that is off.
-    let uncorrelated = uncorrelated.filter(|_| !is_correlated(&structure.found.model.fit));
+    let found = &structure.found.model;
+    let uncorrelated = uncorrelated.filter(|_| !is_correlated(&found.fit, &found.candidates));
     let is_uncorrelated = uncorrelated.is_some();
     if let Some(base) = uncorrelated {
         catalogue.clear();
@@ -287,11 +288,11 @@ pub(crate) fn session_names(datasets: &[Dataset]) -> Vec<String> {
 /// The base fit, of thinned measurements where odometry seems uncorrelated with all of them: between frequent
 /// measurements the robot moves less than their lasting errors, or wrong stamps, move them.
 fn correlated_base<'a>(records: &'a [Dataset], base: ModelFit<'a>) -> ModelFit<'a> {
-    if is_correlated(&base) {
+    if is_correlated(&base, &[]) {
         return base;
     }
     match THINNED.fit(&sessions(records)) {
-        Ok(thinned) if is_correlated(&thinned) => thinned,
+        Ok(thinned) if is_correlated(&thinned, &[]) => thinned,
         _ => base,
     }
 }

@@ -11,6 +11,7 @@ use effects::{CATALOGUE, Hypothesis, RecordCorrection, hypothesis};
 use estimation::{Column, FitSettings, ModelFit, NoiseComponent};
 
 use crate::augmented_model::{cost, count};
+use crate::candidate::{Candidate, terms};
 use crate::settings::levels::SENSOR_HEADING_PRIOR_SIGMA_RAD;
 use crate::settings::records::{
     FACTOR_TOLERANCE, MAX_CORRECTED_OUTLIER_FRACTION, MAX_CORRELATED_WHEEL_SIGMA, MAX_REMAINING_OUTLIER_RATIO,
@@ -52,7 +53,7 @@ pub(crate) fn fault(
     outlying: bool,
 ) -> Option<Fault> {
     let sound = base.is_some_and(is_sound);
-    let uncorrelated = base.is_some_and(|base| !is_correlated(base));
+    let uncorrelated = base.is_some_and(|base| !is_correlated(base, &[]));
     let mut best: Option<(bool, Fault)> = None;
     // The most specific trace first: jumps that are undone at once are also wraps.
     for id in CATALOGUE.iter().rev().filter(|id| !without.iter().any(|out| out == *id)) {
@@ -144,8 +145,8 @@ fn is_sound(fit: &ModelFit<'_>) -> bool {
 
 /// Whether the odometry is correlated with the measurements, for some geometry: its noise is that of a
 /// drive and single measurements tell where the robot went, or all of them together tell that its wheels
-/// are as large as stated, whatever the noise.
-pub(crate) fn is_correlated(fit: &ModelFit<'_>) -> bool {
+/// are as large as stated, whatever the noise. `candidates` are the fit's.
+pub(crate) fn is_correlated(fit: &ModelFit<'_>, candidates: &[Candidate]) -> bool {
     let sigma = |of| fit.solution.noise.sigma(of);
     // A robot that turns on the spot goes nowhere.
     let extent_m = fit.records.extent_m().max(fit.nominal.separation_m);
@@ -153,12 +154,12 @@ pub(crate) fn is_correlated(fit: &ModelFit<'_>) -> bool {
         && sigma(NoiseComponent::Turn) < UNCORRELATED_NOISE_FACTOR * MAX_TURN_SIGMA_RAD_PER_SQRT_RAD
         && sigma(NoiseComponent::MeasurementPosition) < UNCORRELATED_MEASUREMENT_SIGMA * extent_m
         && sigma(NoiseComponent::MeasurementHeading) < UNCORRELATED_MEASUREMENT_SIGMA;
-    follows || determines_wheels(fit)
+    follows || determines_wheels(fit, candidates)
 }
 
 /// Whether the measurements determine both wheels' sizes, and these are those of the stated robot.
-fn determines_wheels(fit: &ModelFit<'_>) -> bool {
-    let Some(covariance) = fit.covariance(&mut []) else { return false };
+fn determines_wheels(fit: &ModelFit<'_>, candidates: &[Candidate]) -> bool {
+    let Some(covariance) = fit.covariance(&mut terms(candidates)) else { return false };
     let relative_sigma = |column: Column| {
         let at = fit.position(column)?;
         // Steps of the wheels' columns are relative.
