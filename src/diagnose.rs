@@ -118,7 +118,9 @@ fn reservations(document: &Document) -> String {
             (None, Some(false)) => "is left out, as its cause is not established",
             (None, _) => "may not carry over to other sessions and kinds of path",
         };
-        finding.of_the_mean.then(|| format!("# {} {what}: {}\n", finding.names.join(" or "), finding.carries_over_why))
+        finding
+            .is_of_the_mean()
+            .then(|| format!("# {} {what}: {}\n", finding.names.join(" or "), finding.carries_over_why))
     };
     document.findings.iter().filter_map(of).collect()
 }
@@ -176,7 +178,7 @@ fn show(document: &Document, terminal: &Terminal) -> Result<(), Failure> {
         terminal.say(&findings.to_string())?;
         for finding in &document.findings {
             terminal.say(&finding.sentence)?;
-            if finding.of_the_mean && finding.carries_over != Some(false) {
+            if finding.is_of_the_mean() && finding.carries_over != Some(false) {
                 let carries = match (finding.carries_over, finding.in_extended_model) {
                     (Some(_), _) => "carries over",
                     (None, Some(false)) => {

@@ -52,7 +52,7 @@ pub(super) fn alternatives(alternatives: &[Alternative], document: &Document) ->
 
 /// Whether what was found holds elsewhere.
 pub(super) fn carries_over(document: &Document) -> Option<Section> {
-    let of_mean: Vec<&Finding> = document.findings.iter().filter(|finding| finding.of_the_mean).collect();
+    let of_mean: Vec<&Finding> = document.findings.iter().filter(|finding| finding.is_of_the_mean()).collect();
     if of_mean.is_empty() {
         return None;
     }

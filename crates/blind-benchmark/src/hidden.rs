@@ -9,6 +9,7 @@ use effects::{
     description, hypothesis,
 };
 use kinematics::Wheels;
+use model_term::ModelTerm;
 
 use super::draw::Draw;
 use super::robot::RandomRobot;
@@ -154,6 +155,13 @@ impl Hidden {
     pub(crate) fn values(&self) -> Vec<(&'static str, f64)> {
         let scaled = self.values.iter().map(|(name, size)| (*name, size * self.scale));
         scaled.chain(self.fixed.iter().copied()).collect()
+    }
+
+    /// Its sizes as the values of a term's parameters; nothing of what has another name.
+    pub(crate) fn term_values(&self, term: &dyn ModelTerm) -> Vec<f64> {
+        let values = self.values();
+        let of = |name: &str| values.iter().find(|(own, _)| *own == name).map_or(0.0, |(_, size)| *size);
+        term.parameters().iter().map(|parameter| of(parameter.name)).collect()
     }
 
     /// How it acts at its scale; `None` when that is not physical.

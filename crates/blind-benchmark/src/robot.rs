@@ -94,9 +94,7 @@ impl RandomRobot {
         let mut paths = draws.of("paths");
         let sessions: Vec<SessionPlan> = (0..sessions)
             .map(|session| {
-                let mut scenario = base.clone();
-                scenario.robot.cruise_speed_m_s = conditions.speed_scale * paths.uniform(0.15, 0.5);
-                scenario.robot.acceleration_m_s2 = conditions.speed_scale * paths.uniform(0.3, 1.0);
+                let scenario = at_drawn_speed(base.clone(), conditions, &mut paths);
                 // The first session has the odd run.
                 let runs = (conditions.runs + sessions - 1 - session) / sessions;
                 let programs = programs(family, &scenario, (driving_s, runs), &mut paths);
@@ -135,19 +133,25 @@ impl RandomRobot {
     }
 }
 
+/// The robot at the speed and acceleration of one session.
+fn at_drawn_speed(mut scenario: Scenario, conditions: &Conditions, draw: &mut Draw) -> Scenario {
+    scenario.robot.cruise_speed_m_s = conditions.speed_scale * draw.uniform(0.15, 0.5);
+    scenario.robot.acceleration_m_s2 = conditions.speed_scale * draw.uniform(0.3, 1.0);
+    scenario
+}
+
 /// A session of another family of paths, at a speed and an acceleration of its own; it carries each load of
 /// the robot's for some runs.
 fn other_session(
     family: PathFamily,
-    mut scenario: Scenario,
+    base: Scenario,
     conditions: &Conditions,
     payload_kg: &[f64],
     draw: &mut Draw,
 ) -> SessionPlan {
     let others: Vec<PathFamily> = PathFamily::ALL.into_iter().filter(|other| *other != family).collect();
     let family = others[draw.below(others.len())];
-    scenario.robot.cruise_speed_m_s = conditions.speed_scale * draw.uniform(0.15, 0.5);
-    scenario.robot.acceleration_m_s2 = conditions.speed_scale * draw.uniform(0.3, 1.0);
+    let scenario = at_drawn_speed(base, conditions, draw);
     let runs = payload_kg.len().max(2) as u32;
     SessionPlan { programs: programs(family, &scenario, (HELD_OUT_S, runs), draw), scenario }
 }

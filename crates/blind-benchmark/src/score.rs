@@ -120,11 +120,8 @@ fn other_session(case: &Case, diagnosis: &Diagnosis) -> Result<Option<f64>, Chal
 fn left_to_chance(case: &Case, truth: &DriveGeometry, floor: f64) -> f64 {
     let left = |(place, log): &(usize, Dataset)| {
         let hidden = &case.hidden[*place];
-        let values = hidden.values();
-        let of = |name: &str| values.iter().find(|(own, _)| *own == name).map_or(0.0, |(_, size)| *size);
         let of_shape = |variant: Variant| {
-            let mut model = Model::of(truth, 0);
-            model.term_values = variant.term.parameters().iter().map(|parameter| of(parameter.name)).collect();
+            let model = Model { term_values: hidden.term_values(&*variant.term), ..Model::of(truth, 0) };
             misfit_of_form(std::slice::from_ref(log), &model, case.noise, &mut [variant.term])
         };
         let variants = hypothesis(hidden.id).and_then(Hypothesis::into_variants)?;

@@ -112,15 +112,10 @@ fn the_gain_of_a_true_term_is_half_of_its_squared_standard_deviation() {
         let Some(variants) = effects::hypothesis(hidden.id).and_then(effects::Hypothesis::into_variants) else {
             continue;
         };
-        let values = hidden.values();
         let (truth, elsewhere) = (case.truth().expect("a drive"), case.drive_elsewhere().expect("simulates"));
         let plain = estimation::Model::of(&truth, 0);
         let gains = variants.into_iter().filter_map(|variant| {
-            let of = |name: &str| values.iter().find(|(own, _)| *own == name).map_or(0.0, |(_, size)| *size);
-            let extended = estimation::Model {
-                term_values: variant.term.parameters().iter().map(|parameter| of(parameter.name)).collect(),
-                ..plain.clone()
-            };
+            let extended = estimation::Model { term_values: hidden.term_values(&*variant.term), ..plain.clone() };
             oracle::gain_of_terms(&elsewhere, case.noise, &plain, &extended, &mut [variant.term])
         });
         let Some((gain, sigma)) = gains.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(_, sigma)| *sigma > 3.0) else {

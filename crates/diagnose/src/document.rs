@@ -119,15 +119,20 @@ pub struct Finding {
     pub carries_over_why: String,
     /// Whether the extended model has it; `None` of what is no term of the mean.
     pub in_extended_model: Option<bool>,
-    /// Whether it is a term of the model's mean, which another session may have as well.
-    #[serde(skip)]
-    pub of_the_mean: bool,
     /// Sizes in each session that determines them, along the proportions found in all.
     pub by_session: BTreeMap<String, BTreeMap<String, Value>>,
     /// The same for each kind of path.
     pub by_kind: BTreeMap<String, BTreeMap<String, Value>>,
     /// How the sizes differ between sessions, and between kinds of path, where there are three or more.
     pub heterogeneity: Vec<Differences>,
+}
+
+impl Finding {
+    /// Whether it is a term of the model's mean, which another session may have as well.
+    #[must_use]
+    pub const fn is_of_the_mean(&self) -> bool {
+        self.in_extended_model.is_some()
+    }
 }
 
 /// How the sizes of a term differ between the units of one level.

@@ -49,7 +49,9 @@ fn of_level(
     let (mut all, mut held_out): (EndErrors, Vec<HeldOutUnit>) = (EndErrors::default(), Vec::new());
     for (number, name) in units.names.iter().enumerate() {
         let unit = HeldOutUnit { unit: name.clone(), found: None, why_null: None, final_position_m: None };
-        held_out.push(match diagnose(&rest(datasets, units, number), options) {
+        let sessions = datasets.iter().enumerate();
+        let rest: Vec<Dataset> = sessions.filter_map(|session| Some(part(session, units, number, false)?.1)).collect();
+        held_out.push(match diagnose(&rest, options) {
             Err(error @ DiagnoseError::UnknownEffect { .. }) => return Err(error),
             Err(error) => HeldOutUnit { why_null: Some(error.to_string()), ..unit },
             Ok(diagnosis) => match end_errors(datasets, units, number, &diagnosis) {
@@ -81,15 +83,18 @@ fn final_position(before: &[EndError], after: &[EndError]) -> Option<Compared> {
     (gains.len() > 1).then(|| Compared::of_ratio(mean(before), mean(after), &gains))
 }
 
-/// The datasets without the runs of a unit; sessions that have no run left are none.
-fn rest(datasets: &[Dataset], units: &Units, unit: usize) -> Vec<Dataset> {
-    let of = |(session, dataset): (usize, &Dataset)| {
-        let runs = dataset.runs.iter().enumerate();
-        let others = runs.filter(|(run, _)| units.of_run.get(&(session, *run)) != Some(&unit));
-        let runs: Vec<dataset::Run> = others.map(|(_, run)| run.clone()).collect();
-        (!runs.is_empty()).then(|| Dataset { runs, ..dataset.header() })
-    };
-    datasets.iter().enumerate().filter_map(of).collect()
+/// The runs of a session that are of a unit, or those that are not: their numbers, and a dataset of them.
+/// `None` where there is none.
+fn part(
+    (session, dataset): (usize, &Dataset),
+    units: &Units,
+    unit: usize,
+    is_of_unit: bool,
+) -> Option<(Vec<usize>, Dataset)> {
+    let is_in = |run: &usize| (units.of_run.get(&(session, *run)) == Some(&unit)) == is_of_unit;
+    let numbers: Vec<usize> = (0..dataset.runs.len()).filter(is_in).collect();
+    let runs = numbers.iter().map(|run| dataset.runs[*run].clone()).collect();
+    (!numbers.is_empty()).then(|| (numbers, Dataset { runs, ..dataset.header() }))
 }
 
 /// The effects of the model that the others' diagnosis hands on, and the ends of a unit's runs. Faults of the
@@ -110,13 +115,7 @@ fn end_errors(
     let extended = if found.is_empty() { &plain } else { &model.calibration };
     let (mut before, mut after) = EndErrors::default();
     for (session, dataset) in datasets.iter().enumerate() {
-        let held: Vec<usize> =
-            (0..dataset.runs.len()).filter(|run| units.of_run.get(&(session, *run)) == Some(&unit)).collect();
-        if held.is_empty() {
-            continue;
-        }
-        let runs = held.iter().map(|run| dataset.runs[*run].clone()).collect();
-        let records = Dataset { runs, ..dataset.header() };
+        let Some((held, records)) = part((session, dataset), units, unit, true) else { continue };
         let (records, _) = model.undone(&records).map_err(|error| error.to_string())?;
         for (calibration, ends) in [(&plain, &mut before), (extended, &mut after)] {
             let runs = evaluate_runs(&records.session(), Some(calibration), &EvaluationOptions::default(), &mut 0.0);

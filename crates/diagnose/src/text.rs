@@ -38,7 +38,6 @@ pub(crate) fn finding(finding: &Finding) -> document::Finding {
         carries_over: finding.carry_over.as_ref().and_then(|of| of.carries_over),
         carries_over_why: why.to_owned(),
         in_extended_model: finding.carry_over.as_ref().map(|_| finding.is_in_extended_model()),
-        of_the_mean: finding.carry_over.is_some(),
         by_session: by(Level::Session),
         by_kind: by(Level::Kind),
         heterogeneity: finding.carry_over.iter().flat_map(CarryOver::heterogeneity).map(differences).collect(),

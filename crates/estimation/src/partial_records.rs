@@ -7,13 +7,13 @@
 
 use std::collections::BTreeMap;
 
-use dataset::{GyroNoise, LidarExtrinsics, Run, RunView, Session};
+use dataset::{GyroNoise, LidarExtrinsics, MIN_LIDAR_TURN_RAD, Run, RunView, Session};
 use kinematics::Wheels;
 
 use crate::model::Model;
 use crate::partial_observation::{Observation, Place, Quantity};
 use crate::segment::{Segment, Start};
-use crate::settings::{GYRO_WINDOW_S, MIN_LIDAR_TURN_RAD, MIN_STANDING_PAIRS, TIME_TOLERANCE_S};
+use crate::settings::{GYRO_WINDOW_S, MIN_STANDING_PAIRS, TIME_TOLERANCE_S};
 use crate::wall_start::WallStart;
 use crate::wheel_angles::WheelAngleInterpolator;
 

@@ -247,11 +247,6 @@ pub(crate) const POSE_SIGMA_M: f64 = 0.02;
 /// Convention: as above.
 pub(crate) const POSE_SIGMA_RAD: f64 = 0.02;
 
-/// Radians. Least range of a run's headings in which a lidar whose place on the robot is not known measures
-/// lengths.
-/// Derived: as MIN_LIDAR_TURN_RAD of the estimator.
-pub(crate) const MIN_LIDAR_TURN_RAD: f64 = 1.0;
-
 /// Ratio of a gap in a log to its median row, from which on it is said.
 /// Budgeted: an operating system delays by less.
 pub(crate) const GAP_RATIO: f64 = 10.0;

@@ -1,6 +1,7 @@
 //! A lidar in front of a straight wall as an instrument: its errors, its place on the robot, and the wall's
 //! in the room.
 
+use kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
 /// A lidar that sees one straight wall: its distance from it and its heading along it, at a fixed rate.
@@ -43,6 +44,19 @@ impl Wall {
     #[must_use]
     pub fn has_lever(&self) -> bool {
         self.lever().iter().any(|part| *part != 0.0)
+    }
+
+    /// Distance of the wall to the left of a lidar's pose in the room, metres; below 0 where it is behind.
+    #[must_use]
+    pub fn distance_m(&self, lidar: Pose) -> f64 {
+        let (sin, cos) = self.wall_direction_rad.sin_cos();
+        self.wall_distance_m + sin * lidar.x_m - cos * lidar.y_m
+    }
+
+    /// Does the lidar see the wall at a distance, metres?
+    #[must_use]
+    pub fn is_seen(&self, distance_m: f64) -> bool {
+        distance_m > 0.0 && distance_m <= self.range_m
     }
 
     /// Keys whose values must be finite, and their values.

@@ -37,7 +37,10 @@ pub(crate) struct Observer {
 
 /// A tape is laid between places that are farther apart than this, metres; a robot is back where it is
 /// nearer.
-const TAPE_FROM_M: f64 = 0.3;
+pub const TAPE_FROM_M: f64 = 0.3;
+
+/// Least turn of a run whose return is measured, radians.
+pub const MIN_RETURN_TURN_RAD: f64 = 1.0;
 
 impl Observer {
     /// The instrument at a position in the scenario's list, in the run of an address.
@@ -148,11 +151,10 @@ impl Observer {
         self.samples += 1;
         let [ahead_m, left_m, turned_rad] = wall.lever();
         let lidar = world_from_body * Pose::new(ahead_m, left_m, turned_rad);
-        let (sin, cos) = wall.wall_direction_rad.sin_cos();
-        let distance_m = wall.wall_distance_m + sin * lidar.x_m - cos * lidar.y_m;
+        let distance_m = wall.distance_m(lidar);
         // Drawn whether it is seen or not: what is not seen moves no other draw.
         let [distance, heading] = self.stream.normals();
-        if distance_m <= 0.0 || distance_m > wall.range_m {
+        if !wall.is_seen(distance_m) {
             return;
         }
         let heading_rad = wrap_to_pi(lidar.theta_rad - wall.wall_direction_rad);
@@ -235,7 +237,7 @@ impl Observer {
             Instrument::Revisit { sigma_xy_m, sigma_theta_rad } => {
                 let moved = first.to(pose);
                 let turned_rad = (pose.theta_rad - first.theta_rad).abs();
-                if moved.x_m.hypot(moved.y_m) > TAPE_FROM_M || turned_rad < 1.0 {
+                if moved.x_m.hypot(moved.y_m) > TAPE_FROM_M || turned_rad < MIN_RETURN_TURN_RAD {
                     return;
                 }
                 let [dx, dy] = self.stream.normals();

@@ -24,6 +24,7 @@ mod servo_error;
 mod simulation;
 mod slam;
 
+pub use instrument::{MIN_RETURN_TURN_RAD, TAPE_FROM_M};
 pub use prepared_program::PreparedProgram;
 pub use robot::{SimulatedRobot, SimulationError};
 pub use servo::ServoError;

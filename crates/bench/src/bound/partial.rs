@@ -8,6 +8,7 @@
 use kinematics::Pose;
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 use scenario::{Instrument, Log};
+use sim_yair::{MIN_RETURN_TURN_RAD, TAPE_FROM_M};
 
 use super::error::NoBound;
 
@@ -15,13 +16,6 @@ use super::error::NoBound;
 /// wall. A thousand times what any reading errs by, so that nothing is known of it, and far from where the
 /// rounding of numbers shows.
 const UNKNOWN_SIGMA: f64 = 10.0;
-
-/// A tape is laid between places that are farther apart than this, metres; a robot is back where it is
-/// nearer: as the simulator has it.
-const TAPE_FROM_M: f64 = 0.3;
-
-/// Least turn of a run whose return is measured, radians, as the simulator has it.
-const MIN_RETURN_TURN_RAD: f64 = 1.0;
 
 /// An instrument that measures parts of poses.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -161,8 +155,7 @@ impl PartialInstrument {
             }
             Self::Wall(wall) => {
                 let (sin, cos) = wall.wall_direction_rad.sin_cos();
-                let distance_m = wall.wall_distance_m + sin * pose.x_m - cos * pose.y_m;
-                let is_seen = distance_m > 0.0 && distance_m <= wall.range_m;
+                let is_seen = wall.is_seen(wall.distance_m(pose));
                 let along_m = cos * pose.x_m + sin * pose.y_m;
                 let distance = scalar([sin, -cos, 0.0], [along_m, 1.0], wall.sigma_m);
                 let heading = scalar([0.0, 0.0, 1.0], [-1.0, 0.0], wall.sigma_rad);

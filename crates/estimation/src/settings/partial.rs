@@ -55,12 +55,6 @@ pub(crate) const START_HEADING_SIGMA_RAD: f64 = 1.0;
 /// Budgeted: robots of any size.
 pub(crate) const LIDAR_PLACE_SIGMA_M: f64 = 10.0;
 
-/// Least range of a run's headings, radians, in which a lidar whose place on the robot is sought measures
-/// distances. In a straight its yaw cannot be told from how obliquely the robot drives at the wall, by which
-/// a distance is a length: calibrated so, wheels had biases of 0.07 % and intervals that covered 65 %.
-/// Budgeted: the lever of the lidar swings by nearly its own length.
-pub(crate) const MIN_LIDAR_TURN_RAD: f64 = 1.0;
-
 /// Squared innovation of a partial measurement over its variance above which it is an outlier.
 /// Derived: χ² with one degree of freedom at 1 − 1e-5, as that of poses.
 pub(crate) const PARTIAL_OUTLIER_CHI_SQUARE: f64 = 19.5;

@@ -6,15 +6,14 @@
 
 use std::collections::BTreeMap;
 
+use dataset::MIN_LIDAR_TURN_RAD;
 use kinematics::{DriveGeometry, Pose, Rule, Wheels};
 
 use crate::kind::Kind;
 use crate::problem::{Problem, Severity};
 use crate::run_log::{Part, RunLog};
 use crate::session_check::SessionCheck;
-use crate::settings::{
-    DETERMINED_SIGMA, INSTANTS, MAX_STRAIGHT_TURN_RAD, MIN_DISTANCE_M, MIN_LIDAR_TURN_RAD, MIN_TURNING_RAD, ONE_WAY,
-};
+use crate::settings::{DETERMINED_SIGMA, INSTANTS, MAX_STRAIGHT_TURN_RAD, MIN_DISTANCE_M, MIN_TURNING_RAD, ONE_WAY};
 use crate::windows::Measured;
 
 pub(crate) const PARAMETERS: [&str; 3] = ["left_wheel_diameter_m", "right_wheel_diameter_m", "wheel_separation_m"];
