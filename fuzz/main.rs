@@ -175,6 +175,11 @@ fn regress_a_gain_that_is_no_number_is_none_with_a_reason() {
 }
 
 #[test]
+fn regress_a_term_with_an_infinite_standard_deviation_is_no_finding() {
+    mended("diagnosis", &[8_009_561]);
+}
+
+#[test]
 fn regress_messages_do_not_say_inf_times_and_inf_turns() {
     mended("calibrators", &[7_100_223, 7_128_401, 7_142_279]);
 }
