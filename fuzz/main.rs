@@ -139,18 +139,49 @@ fn a_campaign_goes_on_behind_the_last_row_of_its_target() {
     assert_eq!((first_after(rows, "bad"), first_after(rows, "censi")), (None, None));
 }
 
-/// Executions of campaigns that were findings. `diagnosis`: of a fit with an effect's terms, which alone made
-/// the odometry follow the measurements, the covariance was asked for without these terms.
-#[test]
-fn regress_a_fit_with_effects_is_asked_for_its_covariance_with_them() {
+/// That executions which a campaign found wrong are not any more.
+#[track_caller]
+fn mended(name: &str, numbers: &[u64]) {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    for (name, number) in [("diagnosis", 1_000_160), ("diagnosis", 1_000_246)] {
-        let target = TARGETS.iter().find(|target| target.name == name).expect("a target");
-        let corpus = (target.corpus)();
+    let target = TARGETS.iter().find(|target| target.name == name).expect("a target");
+    let corpus = (target.corpus)();
+    for &number in numbers {
         if let Ended::Finding(what) = emptied(&folder, |inside| execute(target, &corpus, number, inside)) {
             panic!("YAIR_FUZZ_AT={name}:{number}: {what}");
         }
     }
+}
+
+/// Of a fit with an effect's terms, which alone made the odometry follow the measurements, the covariance was
+/// asked for without these terms.
+#[test]
+fn regress_a_fit_with_effects_is_asked_for_its_covariance_with_them() {
+    mended("diagnosis", &[1_000_160, 1_000_246]);
+}
+
+#[test]
+fn regress_a_check_whose_statistic_is_no_number_does_not_pass_in_silence() {
+    mended("diagnosis", &[7_000_051, 7_000_393]);
+}
+
+#[test]
+fn regress_steps_whose_squares_overflow_end_no_decomposition() {
+    mended("calibrators", &[7_043_685, 7_049_532]);
+}
+
+#[test]
+fn regress_a_gain_that_is_no_number_is_none_with_a_reason() {
+    mended("diagnosis", &[7_005_084, 7_006_128]);
+}
+
+#[test]
+fn regress_a_term_with_an_infinite_standard_deviation_is_no_finding() {
+    mended("diagnosis", &[8_009_561]);
+}
+
+#[test]
+fn regress_messages_do_not_say_inf_times_and_inf_turns() {
+    mended("calibrators", &[7_100_223, 7_128_401, 7_142_279]);
 }
 
 /// Which number is under way, for executions that end the process: memory that runs out, a stack that does.

@@ -236,7 +236,8 @@ impl Calibration {
         let remark = |(parameter, nominal): (Parameter, f64)| {
             let factor = self.estimate(parameter)?.value / nominal;
             let cause = "look for a wrong ticks_per_rev, a wrapping counter, swapped wheels or a unit";
-            let message = || format!("{} is {factor:.3} times its nominal value: {cause}", parameter.key());
+            let times = if factor < 1e6 { format!("{factor:.3}") } else { "more than a million".to_owned() };
+            let message = || format!("{} is {times} times its nominal value: {cause}", parameter.key());
             is_implausible(parameter, factor).then(message)
         };
         nominal.into_iter().filter_map(remark).collect()

@@ -100,7 +100,14 @@ fn compared(
     }
     let pairs: Vec<(f64, f64)> = pairs.into_values().collect();
     let log_score = Compared::of_ratio(per_observation(&before), per_observation(&after), &pairs);
-    Ok((before.len(), (log_score, drift(&reckoned_before, &reckoned_after, held_out))))
+    let is_number = |of: &Compared| [of.base, of.extended, of.low, of.high].iter().all(|value| value.is_finite());
+    if !is_number(&log_score) {
+        return Err(
+            "the likelihood of the held-out runs is no number: their measurements or wheels are beyond any robot's"
+                .to_owned(),
+        );
+    }
+    Ok((before.len(), (log_score, drift(&reckoned_before, &reckoned_after, held_out).filter(is_number))))
 }
 
 /// Drift under both models, by what was held out together.

@@ -61,6 +61,8 @@ pub(crate) fn check(model: &AugmentedModel<'_>) -> Checked {
     covariates(model, null.as_ref(), &mut |check, statistic, p_value| {
         checks.push(TestResult { check, statistic, p_value, passes: true });
     });
+    // Innovations that are all 0, or beyond all bounds, have no correlation and no mean square to test.
+    checks.retain(|check| check.statistic.is_finite() && check.p_value.is_finite());
     let fails = holm(&checks.iter().map(|check| check.p_value).collect::<Vec<_>>(), CHECKS_LEVEL);
     checks.iter_mut().zip(fails).for_each(|(check, fails)| check.passes = !fails);
     let is_displaced = fit.records.segments.iter().all(Segment::is_displacement);

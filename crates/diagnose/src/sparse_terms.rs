@@ -274,5 +274,7 @@ pub(crate) fn sparse<'a>(base: &ModelFit<'a>, model: &AugmentedModel<'a>, level:
     let found = SparseSearch::beside(level, base, model)?.finding(level)?;
     // What is no more than the error of a larger effect's form is none beside it.
     let (test, _) = wald_test(&found.model, found.model.candidates.len().checked_sub(1)?)?;
-    (test.statistic >= form_error_statistic(model)).then_some(found)
+    // As many parameters as observations leave no scatter, and a size without one is not determined.
+    let is_determined = test.estimates.iter().all(|(_, sigma)| sigma.is_finite());
+    (is_determined && test.statistic >= form_error_statistic(model)).then_some(found)
 }

@@ -62,6 +62,11 @@ impl Acceleration {
             self.differences.iter().map(|(difference, _)| metric * difference).collect();
         let products = DMatrix::from_fn(n, n, |i, j| self.differences[i].0.dot(&part_equations[j]));
         let along = DVector::from_fn(n, |i, _| part_equations[i].dot(step));
+        // Squares of absurd steps overflow, and the decomposition panics at what is no number.
+        if !products.iter().chain(along.iter()).all(|value| value.is_finite()) {
+            self.differences.clear();
+            return step.clone();
+        }
         let least = ANDERSON_SINGULAR_VALUE * products.diagonal().max();
         let Ok(shares) = products.svd(true, true).solve(&along, least) else { return step.clone() };
         let combined = self
@@ -103,5 +108,17 @@ mod tests {
             acceleration.moved(step, by);
         }
         assert!(x.norm() < 1e-9, "{x}");
+    }
+
+    #[test]
+    fn steps_whose_squares_overflow_are_not_mixed() {
+        let metric = DMatrix::identity(2, 2) * 1e300;
+        let mut acceleration = Acceleration::default();
+        for size in [1e10, 3e10, -2e10] {
+            let step = DVector::from_element(2, size);
+            let by = acceleration.mixed(&step, &metric);
+            assert_eq!(by, step);
+            acceleration.moved(step, by);
+        }
     }
 }

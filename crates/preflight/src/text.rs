@@ -45,8 +45,8 @@ pub(crate) fn sentence(kind: &Kind, runs: Option<&[String]>) -> String {
     let what = match kind {
         Kind::NothingMoves { wheels_turn_rad, truth_extent_m } => match truth_extent_m {
             Some(extent_m) => format!(
-                "the wheels turn by {:.1} turns but the instrument sees the robot within {:.0} mm; record both while the robot drives",
-                wheels_turn_rad / std::f64::consts::TAU,
+                "the wheels turn by {} turns but the instrument sees the robot within {:.0} mm; record both while the robot drives",
+                turns(*wheels_turn_rad),
                 1e3 * extent_m
             ),
             None => "nothing moves: the wheels do not turn; record while the robot drives".to_owned(),
@@ -189,6 +189,12 @@ pub(crate) fn sentence(kind: &Kind, runs: Option<&[String]>) -> String {
         ),
     };
     format!("{place}{what}")
+}
+
+/// Turns as people read them.
+fn turns(rad: f64) -> String {
+    let turns = rad / std::f64::consts::TAU;
+    if turns < 1e6 { format!("{turns:.1}") } else { "more than a million".to_owned() }
 }
 
 /// A ratio as people read it. What is beyond all numbers, or below, has a bound.
