@@ -205,7 +205,9 @@ impl Stream {
     /// Standard normal draws, one after the other.
     #[inline]
     pub fn normals<const N: usize>(&mut self) -> [f64; N] {
-        std::array::from_fn(|_| self.normal())
+        let mut draws = [0.0; N];
+        draws.iter_mut().for_each(|draw| *draw = self.normal());
+        draws
     }
 
     /// A draw uniform in [0, 1).

@@ -63,6 +63,7 @@ struct Marks {
 
 impl Marks {
     /// Turn between start and end, the multiple of whole turns nearest to `about_rad` (paper, eq. 8 and 14).
+    #[inline]
     fn turn_rad(&self, about_rad: f64) -> f64 {
         let axle = |marks: &Wheels<Point>| (marks.left.x_m - marks.right.x_m, marks.left.y_m - marks.right.y_m);
         let ((x0, y0), (x1, y1)) = (axle(&self.start), axle(&self.end));
