@@ -21,7 +21,7 @@ use crate::gain::gain_by_level;
 use crate::log_rows::{check_rows, check_spans};
 use crate::mean_structure::{THINNED, mean_structure};
 use crate::plan::{Limits, next_experiment};
-use crate::record_faults::{Fault, fault, is_correlated, rejected_share, sessions};
+use crate::record_faults::{Fault, determines_wheels, fault, is_correlated, rejected_share, sessions};
 use crate::residuals::{Residuals, residuals};
 use crate::settings::records::{
     MAX_REJECTED_FRACTION, MIN_COMMON_CLOCK_OFFSET_S, MIN_MEASUREMENTS_PER_RUN, MIN_REJECTING_CLOCK_OFFSET_S,
@@ -286,13 +286,14 @@ pub(crate) fn session_names(datasets: &[Dataset]) -> Vec<String> {
 }
 
 /// The base fit, of thinned measurements where odometry seems uncorrelated with all of them: between frequent
-/// measurements the robot moves less than their lasting errors, or wrong stamps, move them.
+/// measurements the robot moves less than their lasting errors, or wrong stamps, move them. A few that are left
+/// and determine no wheel do not say that it is correlated.
 fn correlated_base<'a>(records: &'a [Dataset], base: ModelFit<'a>) -> ModelFit<'a> {
     if is_correlated(&base, &[]) {
         return base;
     }
     match THINNED.fit(&sessions(records)) {
-        Ok(thinned) if is_correlated(&thinned, &[]) => thinned,
+        Ok(thinned) if determines_wheels(&thinned, &[]) => thinned,
         _ => base,
     }
 }

@@ -191,14 +191,20 @@ pub(crate) fn of_sparse(candidate: &Candidate, test: &Test, p_value: f64, trials
 }
 
 /// Something is left, and nothing that was tried explains it.
-pub(crate) fn of_failed_checks(checked: &Checked) -> Option<Finding> {
+pub(crate) fn of_failed_checks(checked: &Checked, without: &[String]) -> Option<Finding> {
     let failed: Vec<Check> = checked.checks.iter().filter(|test| !test.passes).map(|test| test.check.clone()).collect();
     // Heavy tails have causes of their own: the p-value is that of the tests of dependence.
     let least = |tests: &mut dyn Iterator<Item = &TestResult>| tests.map(|test| test.p_value).reduce(f64::min);
     let worst = least(&mut checked.checks.iter().filter(|test| test.shows_dependence()))
         .or_else(|| least(&mut checked.checks.iter().filter(|test| !test.passes)));
     let worst = worst.filter(|_| !failed.is_empty())?;
-    Some(of_causes(vec![Cause::Unknown], worst, BTreeMap::new(), Basis::FailedTests(failed)))
+    // Residuals that are correlated with the ones before them, and with nothing that was recorded, may be errors of
+    // the instrument that last.
+    let only_correlated = failed.iter().all(|check| matches!(check, Check::Whiteness(_)));
+    let sign = only_correlated.then_some(Sign::AutocorrelatedErrors);
+    let errors = sign.into_iter().flat_map(|sign| with_sign(sign, without)).map(Cause::Effect);
+    let causes = errors.chain([Cause::Unknown]).collect();
+    Some(of_causes(causes, worst, BTreeMap::new(), Basis::FailedTests(failed)))
 }
 
 /// Doubts mean effects: one uncatalogued term explains as much, with these odds over them.
@@ -337,9 +343,11 @@ pub(crate) fn of_fault(fault: &Fault) -> Finding {
     let value = |(name, value): &(&'static str, f64)| {
         ((*name).to_owned(), Value { value: *value, sigma: None, unit: "1".to_owned() })
     };
+    let rivals = fault.rivals.iter().map(|(id, _)| Cause::Effect(id));
+    let odds = fault.rivals.iter().map(|(_, log_odds)| relative_odds(fault.gain + log_odds, fault.gain));
     Finding {
-        causes: vec![Cause::Effect(fault.id)],
-        probability: 1.0,
+        causes: [Cause::Effect(fault.id)].into_iter().chain(rivals).collect(),
+        probability: 1.0 / (1.0 + odds.sum::<f64>()),
         z: (2.0 * fault.gain.min(1e6)).sqrt(),
         // A likelihood ratio of e^gain bounds the probability of as much by accident (Markov's inequality).
         p_value: (-fault.gain).exp(),

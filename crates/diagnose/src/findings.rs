@@ -162,6 +162,8 @@ fn faults_of_the_log(results: &StageResults<'_, '_>, mut findings: Vec<Finding>)
     let wheels = wheels.and_then(|factor| finding::of_wrong_wheels(factor, without));
     let geometry = deviations.into_iter().map(|deviation| finding::of_geometry(deviation, without));
     let wheels = wheels.into_iter().chain(geometry);
+    // Rows whose counts or stamps were restored roughly lie off by what is left.
+    let log = log.filter(|_| !results.restored());
     let of_log = finding::of_outlying_rows(log).into_iter().chain(finding::of_spans(spans));
     let (nameless, named): (Vec<_>, Vec<_>) = of_log.chain(wheels).partition(Finding::is_unlisted);
     findings.extend(named);
@@ -184,7 +186,7 @@ fn failed_checks(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> 
     let scatters = findings.iter().any(is_scatter) && !structure.checked.checks.iter().any(plainly);
     let is_reported = structure.unlisted.is_some() || findings.iter().any(Finding::is_unlisted);
     if !(results.restored() || scatters || is_reported) {
-        findings.extend(finding::of_failed_checks(&structure.checked));
+        findings.extend(finding::of_failed_checks(&structure.checked, results.without));
     }
     findings
 }

@@ -12,18 +12,21 @@ use estimation::{Column, FitSettings, ModelFit, NoiseComponent};
 
 use crate::augmented_model::{cost, count};
 use crate::candidate::{Candidate, terms};
+use crate::model_comparison::log_odds_margin;
 use crate::settings::levels::SENSOR_HEADING_PRIOR_SIGMA_RAD;
 use crate::settings::records::{
-    FACTOR_TOLERANCE, MAX_CORRECTED_OUTLIER_FRACTION, MAX_CORRELATED_WHEEL_SIGMA, MAX_REMAINING_OUTLIER_RATIO,
-    MAX_SENSOR_HEADING_RAD, MAX_SEPARATION_DEVIATION_SIGMAS, MAX_SOUND_OUTLIER_FRACTION,
-    MAX_TURN_SIGMA_RAD_PER_SQRT_RAD, MAX_WHEEL_DEVIATION_SIGMAS, MAX_WHEEL_SIGMA_M_PER_SQRT_M,
-    MIN_FAULT_LOG_LIKELIHOOD_GAIN, SEPARATION_PRIOR_SIGMA, UNCORRELATED_MEASUREMENT_SIGMA, UNCORRELATED_NOISE_FACTOR,
-    WHEEL_PRIOR_SIGMA, WRONG_WHEELS_FACTOR,
+    FACTOR_TOLERANCE, LOG_ODDS_OF_A_MISTAKE, MAX_CORRECTED_OUTLIER_FRACTION, MAX_CORRELATED_WHEEL_SIGMA,
+    MAX_REMAINING_NOISE_RATIO, MAX_REMAINING_OUTLIER_RATIO, MAX_SENSOR_HEADING_RAD, MAX_SEPARATION_DEVIATION_SIGMAS,
+    MAX_SOUND_OUTLIER_FRACTION, MAX_TURN_SIGMA_RAD_PER_SQRT_RAD, MAX_WHEEL_DEVIATION_SIGMAS,
+    MAX_WHEEL_SIGMA_M_PER_SQRT_M, MIN_FAULT_LOG_LIKELIHOOD_GAIN, SEPARATION_PRIOR_SIGMA,
+    UNCORRELATED_MEASUREMENT_SIGMA, UNCORRELATED_NOISE_FACTOR, WHEEL_PRIOR_SIGMA, WRONG_WHEELS_FACTOR,
 };
 
 /// A fault with the records without it.
 pub(crate) struct Fault {
     pub(crate) id: &'static str,
+    /// Other faults that these records do not discriminate from it, with their log odds against it.
+    pub(crate) rivals: Vec<(&'static str, f64)>,
     pub(crate) values: Vec<(&'static str, f64)>,
     pub(crate) sentence: String,
     pub(crate) records: Vec<Dataset>,
@@ -55,6 +58,7 @@ pub(crate) fn fault(
     let sound = base.is_some_and(is_sound);
     let uncorrelated = base.is_some_and(|base| !is_correlated(base, &[]));
     let mut best: Option<(bool, Fault)> = None;
+    let mut tried: Vec<(&'static str, bool, f64)> = Vec::new();
     // The most specific trace first: jumps that are undone at once are also wraps.
     for id in CATALOGUE.iter().rev().filter(|id| !without.iter().any(|out| out == *id)) {
         let Some(Hypothesis::Records(corrections)) = hypothesis(id) else { continue };
@@ -62,7 +66,7 @@ pub(crate) fn fault(
         if sound && effects::description(id).is_some_and(|description| !description.record_fault.leaves_a_trace) {
             continue;
         }
-        for Form { values, sentence, visible_in_log, records } in batched(datasets, corrections) {
+        for Form { values, sentence, visible_in_log, mistakes, records } in batched(datasets, corrections) {
             if outlying && !visible_in_log {
                 continue;
             }
@@ -75,7 +79,8 @@ pub(crate) fn fault(
             let most_outliers = base.map_or(MAX_CORRECTED_OUTLIER_FRACTION, |base| {
                 MAX_CORRECTED_OUTLIER_FRACTION.max(MAX_REMAINING_OUTLIER_RATIO * rejected_share(base))
             });
-            let is_plausible = is_drive(&fit)
+            let is_plausible = (is_drive(&fit) || base.is_some_and(|base| is_far_more_of_a_drive(&fit, base)))
+                && is_correlated(&fit, &[])
                 && rejected_share(&fit) < most_outliers
                 && fit.solution.model.body_from_sensor.theta_rad.abs() <= MAX_SENSOR_HEADING_RAD;
             if !is_plausible && !visible_in_log {
@@ -86,6 +91,7 @@ pub(crate) fn fault(
                 let measurements = count(base).max(count(&fit));
                 cost(base, measurements) + implausible(base) - cost(&fit, measurements) - implausible(&fit)
             });
+            let gain = gain - f64::from(mistakes - 1) * LOG_ODDS_OF_A_MISTAKE;
             // What the log shows needs no instrument; one must not contradict it, where it has anything to
             // say.
             let min_gain = match visible_in_log {
@@ -96,15 +102,33 @@ pub(crate) fn fault(
             let better = |(known_visible, known): &(bool, Fault)| {
                 (visible_in_log, gain) > (*known_visible, known.gain + f64::from(u8::from(*known_visible)))
             };
-            if gain > min_gain && best.as_ref().is_none_or(better) {
-                best = Some((
-                    visible_in_log,
-                    Fault { id, values, sentence, records, gain: gain.max(MIN_FAULT_LOG_LIKELIHOOD_GAIN) },
-                ));
+            if gain <= min_gain {
+                continue;
+            }
+            tried.push((id, visible_in_log, gain));
+            if best.as_ref().is_none_or(better) {
+                let gain = gain.max(MIN_FAULT_LOG_LIKELIHOOD_GAIN);
+                best = Some((visible_in_log, Fault { id, rivals: Vec::new(), values, sentence, records, gain }));
             }
         }
     }
-    best.map(|(_, fault)| fault)
+    best.map(|(visible, fault)| Fault { rivals: rivals(&tried, visible, &fault), ..fault })
+}
+
+/// The faults that undo as much as the best one, each with its log odds against that. What the log shows by
+/// itself has its own trace, and no rival.
+fn rivals(tried: &[(&'static str, bool, f64)], visible: bool, best: &Fault) -> Vec<(&'static str, f64)> {
+    let mut rivals: Vec<(&'static str, f64)> = Vec::new();
+    for &(id, _, gain) in tried.iter().filter(|(id, own, _)| !visible && !*own && *id != best.id) {
+        let odds = gain - best.gain;
+        match rivals.iter_mut().find(|(of, _)| *of == id) {
+            Some(known) => known.1 = known.1.max(odds),
+            None => rivals.push((id, odds)),
+        }
+    }
+    rivals.retain(|(_, odds)| *odds >= -log_odds_margin(best.gain));
+    rivals.sort_by(|a, b| b.1.total_cmp(&a.1));
+    rivals
 }
 
 /// Records whose motion is unknown where that of others is.
@@ -158,7 +182,7 @@ pub(crate) fn is_correlated(fit: &ModelFit<'_>, candidates: &[Candidate]) -> boo
 }
 
 /// Whether the measurements determine both wheels' sizes, and these are those of the stated robot.
-fn determines_wheels(fit: &ModelFit<'_>, candidates: &[Candidate]) -> bool {
+pub(crate) fn determines_wheels(fit: &ModelFit<'_>, candidates: &[Candidate]) -> bool {
     let Some(covariance) = fit.covariance(&mut terms(candidates)) else { return false };
     let relative_sigma = |column: Column| {
         let at = fit.position(column)?;
@@ -175,6 +199,16 @@ fn is_drive(fit: &ModelFit<'_>) -> bool {
     has_stated_geometry(fit)
         && fit.solution.noise.sigma(NoiseComponent::Wheel) < MAX_WHEEL_SIGMA_M_PER_SQRT_M
         && fit.solution.noise.sigma(NoiseComponent::Turn) < MAX_TURN_SIGMA_RAD_PER_SQRT_RAD
+        && fit.solution.converged
+}
+
+/// Are the wheels those of the stated robot, and is far less left of the noise that another fit needs? What was
+/// lost beside a fault is noise still.
+fn is_far_more_of_a_drive(fit: &ModelFit<'_>, than: &ModelFit<'_>) -> bool {
+    let wheel_sigma = |fit: &ModelFit<'_>| fit.solution.noise.sigma(NoiseComponent::Wheel);
+    has_stated_geometry(fit)
+        && fit.solution.noise.sigma(NoiseComponent::Turn) < MAX_TURN_SIGMA_RAD_PER_SQRT_RAD
+        && wheel_sigma(fit) < MAX_REMAINING_NOISE_RATIO * wheel_sigma(than)
         && fit.solution.converged
 }
 
@@ -201,6 +235,8 @@ struct Form {
     sentence: String,
     /// The log of some session shows it by itself.
     visible_in_log: bool,
+    /// As in the correction.
+    mistakes: u32,
     /// The records without it.
     records: Vec<Dataset>,
 }
@@ -229,6 +265,7 @@ fn batched(datasets: &[Dataset], corrections: fn(&Dataset) -> Vec<RecordCorrecti
                 values: correction.values.clone(),
                 sentence: correction.sentence.clone(),
                 visible_in_log: correction.visible_in_log,
+                mistakes: correction.mistakes,
                 records: Vec::new(),
             }),
         }

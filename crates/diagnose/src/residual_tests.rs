@@ -14,8 +14,8 @@ use crate::covariate_tests::covariates;
 use crate::null_distribution::{NullDistribution, among_simulated, beyond_simulated};
 use crate::settings::levels::CHECKS_LEVEL;
 use crate::settings::residuals::{
-    AFTER_OUTLIER_LEVEL, CANCELLATION_RATIO, MIN_KURTOSIS_INNOVATIONS, MIN_WHITENESS_INNOVATIONS, MIN_WHITENESS_PAIRS,
-    OUTLIER_PROBABILITY, PERSISTENCE_SIGMAS, TAIL_INNOVATION_SIGMAS, WHITENESS_LAGS,
+    AFTER_OUTLIER_LEVEL, CANCELLATION_RATIO, MAX_WITHIN_ROW_SHARE, MIN_KURTOSIS_INNOVATIONS, MIN_WHITENESS_INNOVATIONS,
+    MIN_WHITENESS_PAIRS, OUTLIER_PROBABILITY, PERSISTENCE_SIGMAS, TAIL_INNOVATION_SIGMAS, WHITENESS_LAGS,
 };
 use crate::statistics::{holm, p_of_chi_square, p_of_z};
 
@@ -98,10 +98,23 @@ fn innovations<'f>(fit: &'f ModelFit<'_>, component: usize) -> Vec<&'f Innovatio
     first.map(|phase| phase.iter().filter(|innovation| innovation.component == component).collect()).unwrap_or_default()
 }
 
+/// Whether a measurement's error is of the fitted noise: what nobody recorded of the motion within rows has a
+/// size that is known roughly, and tails of its own.
+fn is_tested_by_size(fit: &ModelFit<'_>, (segment, measurement): (usize, usize)) -> bool {
+    fit.within_row_share(segment, measurement) <= MAX_WITHIN_ROW_SHARE
+}
+
+/// The innovations whose size and tails are tested.
+fn tested<'f>(fit: &'f ModelFit<'_>, component: usize) -> Vec<&'f InnovationComponent> {
+    let mut tested = innovations(fit, component);
+    tested.retain(|innovation| is_tested_by_size(fit, (innovation.segment, innovation.measurement)));
+    tested
+}
+
 /// Σz² over the measurements, and how it differs between runs: the noise is one for all.
 fn size(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) {
     for (component, name) in Component::ALL.into_iter().enumerate() {
-        let squares: Vec<f64> = innovations(fit, component).iter().map(|innovation| innovation.z.powi(2)).collect();
+        let squares: Vec<f64> = tested(fit, component).iter().map(|innovation| innovation.z.powi(2)).collect();
         let n = squares.len() as f64;
         if n < 2.0 {
             continue;
@@ -176,7 +189,7 @@ fn whiteness(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) -> (f64,
 
 fn tails(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) {
     for (component, name) in Component::ALL.into_iter().enumerate() {
-        let series = innovations(fit, component);
+        let series = tested(fit, component);
         let n = series.len() as f64;
         if n < MIN_KURTOSIS_INNOVATIONS {
             continue;
@@ -259,7 +272,9 @@ fn cancel(fit: &ModelFit<'_>, first: usize, second: usize, wrong: usize) -> bool
 pub(crate) fn residual_persistence(model: &AugmentedModel<'_>, component: usize) -> ResidualPersistence {
     let fit = &*model.fit.with_innovations(&mut terms(&model.candidates));
     let series = innovations(fit, component);
-    let large = |pair: &&[&InnovationComponent]| pair[0].z.abs() > TAIL_INNOVATION_SIGMAS;
+    let large = |pair: &&[&InnovationComponent]| {
+        pair[0].z.abs() > TAIL_INNOVATION_SIGMAS && is_tested_by_size(fit, (pair[0].segment, pair[0].measurement))
+    };
     let follows = |is_next: &dyn Fn(usize, usize) -> bool| {
         let pairs = series.windows(2).filter(large).filter(|pair| is_next(pair[0].segment, pair[1].segment));
         let (sum, count) = pairs.fold((0.0, 0.0_f64), |(sum, n), pair| (sum + pair[1].z * pair[0].z.signum(), n + 1.0));

@@ -104,7 +104,7 @@ fn sentence(finding: &Finding) -> String {
         (Basis::Mean, [first, ..]) => {
             format!("one of {}; this data cannot tell which. As {first}: {what}", own.join(", "))
         }
-        (Basis::Products(_) | Basis::FailedTests(_), _) => what,
+        (Basis::Products(_), _) | (Basis::FailedTests(_), ["unlisted"]) => what,
         (_, ["unlisted"] | []) => format!("not in the catalogue: {what}"),
         (_, [id]) => format!("{id}: {what}"),
         (_, ids) => format!("one of {}; this data cannot tell which: {what}", ids.join(", ")),
@@ -151,11 +151,14 @@ fn basis(finding: &Finding) -> String {
             )
         }
         Basis::FailedTests(failed) => {
-            let failed: Vec<String> = failed.iter().map(Check::name).collect();
-            format!(
-                "the residuals are not what the model says ({}), and nothing in the catalogue explains it: the cause is not determined",
-                failed.join(", ")
-            )
+            let failed = failed.iter().map(Check::name).collect::<Vec<_>>().join(", ");
+            if finding.causes.len() > 1 {
+                format!("the residuals are autocorrelated ({failed}), and nothing that was recorded explains it")
+            } else {
+                format!(
+                    "the residuals are not what the model says ({failed}), and nothing in the catalogue explains it: the cause is not determined"
+                )
+            }
         }
         Basis::Uncorrelated([wheel, turn, position, heading]) => format!(
             "odometry is uncorrelated with what the instrument measured: to the best fit the wheels err by {:.0} mm/√m and {:.0} mrad/√rad, and measurements by {:.0} mm and {:.0} mrad",

@@ -92,6 +92,8 @@ pub struct RecordCorrection {
     pub sentence: String,
     /// Whether the log itself shows the fault, whatever an instrument saw.
     pub visible_in_log: bool,
+    /// Separate mistakes that it takes, such as one for each wheel that is wired the wrong way round.
+    pub mistakes: u32,
     /// The records as they would be without it.
     pub records: Dataset,
 }

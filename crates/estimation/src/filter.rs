@@ -344,7 +344,9 @@ impl<'f, 'a> Filter<'f, 'a> {
             noise_score: pass_options.noise_score,
         };
         rounding.advance(&step);
-        FilterState { pose, covariance, by, covariance_by, pose_by_noise }.advance(&step);
+        let mut state = FilterState { pose, covariance, by, covariance_by, pose_by_noise };
+        state.advance(&step);
+        rounding.pass(&mut state, pass_options.noise_score);
     }
 
     /// Takes a measurement; false, and nothing changes, when it lies too far off.

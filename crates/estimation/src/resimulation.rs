@@ -35,6 +35,22 @@ impl ModelFit<'_> {
         })
     }
 
+    /// Share of the variance of what a measurement is off by that nobody recorded of the motion within the
+    /// rows that it falls into: of its position or its heading, whichever is more.
+    #[must_use]
+    pub fn within_row_share(&self, segment: usize, measurement: usize) -> f64 {
+        let of_segment = &self.records.segments[segment];
+        let Some(measured) = of_segment.measurements.get(measurement) else { return 0.0 };
+        let starts = of_segment.intervals.first().filter(|_| of_segment.is_displacement());
+        let ends = measured.after.checked_sub(1).and_then(|last| of_segment.intervals.get(last));
+        let at_start = starts.map_or(Wheels::both(0.0), |first| first.interpolated_rad2[0]);
+        let at_end = ends.map_or(Wheels::both(0.0), |last| last.interpolated_rad2[1]);
+        let within_row = PoseVariance::of(at_start.zip_with(at_end, |start, end| start + end), &self.solution.model);
+        let [_, _, position_m2, heading_rad2] = self.solution.noise.variance;
+        let share = |own: f64, other: f64| if own > 0.0 { own / (own + other) } else { 0.0 };
+        share(within_row.along_m2, position_m2).max(share(within_row.heading_rad2, heading_rad2))
+    }
+
     /// The runs once more, by the values found, with the pass at them. `number` addresses the draws; `terms`
     /// are those of the fit.
     #[must_use]

@@ -11,8 +11,9 @@
 //! the smoother's step of Rauch, Tung & Striebel 1965 for a state that does not move. Rounding adds nothing
 //! from row to row, and a standstill does not average it out. Widrow & Kollár 2008 (q²/12).
 //!
-//! Between two rows the wheels' turns are off too, by what nobody recorded of the motion there. That error is
-//! one for all measurements of a row, and another in the next: it is carried in the same way.
+//! Between two rows the wheels' turns are off too, by what nobody recorded of the motion there: by nothing at
+//! both rows, and most in the middle. That error is carried in the same way, to the next measurement or the
+//! row's end, whichever comes first. Measurements of one row are taken to have independent ones.
 
 use kinematics::{Pose, Wheels, sin_cos};
 use nalgebra::{Matrix3, Vector3};
@@ -30,9 +31,17 @@ enum Carries {
     /// That of the counts.
     OfCounts,
     /// The robot's, since a start: nothing is known of the counts' rounding.
-    SinceStart { own: PoseVariance },
+    SinceStart { own: OwnVariance },
     /// The robot's, since a measurement after the counts had changed.
-    SinceMeasurement { own: PoseVariance, pose: Pose, covariance: Covariance, by_noise: [[f64; NOISES]; 3] },
+    SinceMeasurement { own: OwnVariance, pose: Pose, covariance: Covariance, by_noise: [[f64; NOISES]; 3] },
+}
+
+/// What the robot's pose is off the counts' by.
+#[derive(Clone, Copy)]
+struct OwnVariance {
+    pose: PoseVariance,
+    /// Most of it is motion within the row, which is another at each instant.
+    is_of_instant: bool,
 }
 
 /// What both wheels' turns are off by makes of a pose.
@@ -110,15 +119,19 @@ impl Rounding {
     }
 
     /// What a pose is off by where the motion within a row adds these variances of the wheels' turns.
-    fn at(&self, interpolated_rad2: Wheels<f64>, model: &Model) -> PoseVariance {
-        PoseVariance::of(self.variance_rad2.zip_with(interpolated_rad2, |a, b| a + b), model)
+    fn at(&self, interpolated_rad2: Wheels<f64>, model: &Model) -> OwnVariance {
+        let rounded_rad2 = self.variance_rad2;
+        OwnVariance {
+            pose: PoseVariance::of(rounded_rad2.zip_with(interpolated_rad2, |a, b| a + b), model),
+            is_of_instant: interpolated_rad2.left + interpolated_rad2.right > rounded_rad2.left + rounded_rad2.right,
+        }
     }
 
     /// The filter starts at a measurement of these variances: what it carries is the robot's pose.
     #[inline(always)]
     pub(crate) fn start(&mut self, variance: [f64; 2], interpolated_rad2: Wheels<f64>, model: &Model) {
         let own = self.at(interpolated_rad2, model);
-        self.carries = if own.matters(variance) { Carries::SinceStart { own } } else { Carries::OfCounts };
+        self.carries = if own.pose.matters(variance) { Carries::SinceStart { own } } else { Carries::OfCounts };
     }
 
     /// A measurement of these variances comes: the robot's pose is carried from here on.
@@ -134,11 +147,11 @@ impl Rounding {
             return;
         }
         let own = self.at(interpolated_rad2, model);
-        if !own.matters(variance) {
+        if !own.pose.matters(variance) {
             return;
         }
         let covariance = *state.covariance;
-        *state.covariance = Covariance::of([&(covariance.matrix(0) + own.in_room(state.pose.theta_rad))]);
+        *state.covariance = Covariance::of([&(covariance.matrix(0) + own.pose.in_room(state.pose.theta_rad))]);
         self.by.copy_from(state.by);
         self.covariance_by = *state.covariance_by;
         self.carries = Carries::SinceMeasurement { own, pose: *state.pose, covariance, by_noise: *state.pose_by_noise };
@@ -153,6 +166,19 @@ impl Rounding {
         }
     }
 
+    /// The robot has gone on within a row: where that changes what nobody recorded of its motion there, the
+    /// counts' pose is carried from here on.
+    #[inline(always)]
+    pub(crate) fn pass(&mut self, state: &mut FilterState<'_>, noise_score: bool) {
+        let own = match self.carries {
+            Carries::OfCounts => return,
+            Carries::SinceStart { own } | Carries::SinceMeasurement { own, .. } => own,
+        };
+        if own.is_of_instant {
+            self.leave(state, noise_score);
+        }
+    }
+
     /// A wheel turns on: the counts' pose is carried from here on.
     #[inline(always)]
     pub(crate) fn leave(&mut self, state: &mut FilterState<'_>, noise_score: bool) {
@@ -161,12 +187,12 @@ impl Rounding {
             Carries::OfCounts => {}
             // Without any knowledge before, the counts' pose is the robot's and their rounding.
             Carries::SinceStart { own } => {
-                let covariance = state.covariance.matrix(0) + own.in_room(state.pose.theta_rad);
+                let covariance = state.covariance.matrix(0) + own.pose.in_room(state.pose.theta_rad);
                 *state.covariance = Covariance::of([&covariance]);
             }
             Carries::SinceMeasurement { own, pose, covariance, by_noise } => {
                 let covariance = covariance.matrix(0);
-                let entered = covariance + own.in_room(pose.theta_rad);
+                let entered = covariance + own.pose.in_room(pose.theta_rad);
                 // Nothing was rounded, or nothing is known of the pose: no measurement says anything of it.
                 let Some(inverse) = entered.try_inverse() else { return };
                 let gain = covariance * inverse;

@@ -212,8 +212,7 @@ impl<'a> WheelAngleInterpolator<'a> {
     /// whichever says less, and not at all where they disagree, as at a jump of the speed (van Leer 1979).
     /// 0 where single rows do not say their rates, and in rows so long that a robot does several things.
     fn acceleration_rad_s2(&self, row: usize) -> Wheels<f64> {
-        let is_steady = || (row - 1..=row + 1).all(|row| self.rates.are_joined(self.t_s, row));
-        let Some([before, after]) = self.accelerations_around(row).filter(|_| is_steady()) else {
+        let Some([before, after]) = self.accelerations_around(row).filter(|_| self.is_steady_around(row)) else {
             return Wheels::both(0.0);
         };
         before.zip_with(
@@ -222,6 +221,11 @@ impl<'a> WheelAngleInterpolator<'a> {
                 if before * after > 0.0 { before.signum() * before.abs().min(after.abs()) } else { 0.0 }
             },
         )
+    }
+
+    /// Whether a row and both of its neighbours are short, without a gap between them.
+    fn is_steady_around(&self, row: usize) -> bool {
+        (row - 1..=row + 1).all(|row| self.rates.are_joined(self.t_s, row))
     }
 
     /// How the wheels speed up from the row before to a row, and from it to the next, rad/s²; `None` where
@@ -241,22 +245,26 @@ impl<'a> WheelAngleInterpolator<'a> {
     /// Variances of the wheels' turns at an instant of a row's interval, rad²: an acceleration that is off by
     /// what it changes by from row to row, or by what it changes by in the rows around where that is more, as
     /// what pushes the shafts goes on. A smooth one is off by half of that; one that changes faster than rows
-    /// come, by more than they show.
+    /// come, by more than they show. In a row that is not taken to speed up, all of its acceleration is off.
     fn interpolated_rad2(&self, row: usize, t_s: f64) -> Wheels<f64> {
         let since_s = t_s - self.t_s[row];
         let left_s = self.t_s.get(row + 1).map_or(0.0, |next_s| next_s - t_s);
         if since_s <= TIME_TOLERANCE_S || left_s <= TIME_TOLERANCE_S {
             return Wheels::both(0.0);
         }
-        let change = |row: usize| {
+        let off_by = |row: usize| {
             let [before, after] = self.accelerations_around(row)?;
-            Some(before.zip_with(after, |before, after| (after - before).powi(2)))
+            let is_taken = self.is_steady_around(row);
+            Some(before.zip_with(after, |before, after| {
+                let change = (after - before).powi(2);
+                if is_taken { change } else { change.max(before * before).max(after * after) }
+            }))
         };
         let near = row.saturating_sub(ROWS_OF_CHANGE)..row + ROWS_OF_CHANGE + 1;
-        let (sum, count) = near.filter_map(change).fold((Wheels::both(0.0), 0.0_f64), |(sum, count), change| {
-            (sum.zip_with(change, |sum, change| sum + change), count + 1.0)
+        let (sum, count) = near.filter_map(off_by).fold((Wheels::both(0.0), 0.0_f64), |(sum, count), off_by| {
+            (sum.zip_with(off_by, |sum, off_by| sum + off_by), count + 1.0)
         });
-        let own = change(row).unwrap_or(Wheels::both(0.0));
+        let own = off_by(row).unwrap_or(Wheels::both(0.0));
         let half_s2 = 0.5 * since_s * left_s;
         own.zip_with(sum, |own, sum| own.max(sum / count.max(1.0)) * half_s2 * half_s2)
     }

@@ -5,6 +5,10 @@
 /// Tuned: by hand; no record of what on.
 pub(crate) const MIN_FAULT_LOG_LIKELIHOOD_GAIN: f64 = 20.0;
 
+/// Natural logarithm of odds. Cost of each mistake beyond the first that a fault of the records takes.
+/// Budgeted: ln 20, a second mistake in one of twenty robots that have a first.
+pub(crate) const LOG_ODDS_OF_A_MISTAKE: f64 = 3.0;
+
 /// Seconds. Offsets of clocks are sought up to this.
 /// Convention: an instrument that is later than a second is another recording.
 pub(crate) const MAX_CLOCK_OFFSET_S: f64 = 1.0;
@@ -113,6 +117,11 @@ pub(crate) const UNCORRELATED_MEASUREMENT_SIGMA: f64 = 0.3;
 /// Budgeted: by accident wheels that do not move the robot are as large as stated to 2 % once in fifty
 /// times.
 pub(crate) const MAX_CORRELATED_WHEEL_SIGMA: f64 = 0.02;
+
+/// Ratio. Largest wheel noise of a fit without a fault over that with it, where it is more than a plausible
+/// drive's. Rows that were lost beside a fault leave some.
+/// Budgeted: a sixteenth of the variance, which no accident of some tens of measurements gives.
+pub(crate) const MAX_REMAINING_NOISE_RATIO: f64 = 0.25;
 
 /// Fraction of the measurements. With more outliers, a fit is not sound and faults without a trace in the log
 /// are tried.

@@ -231,6 +231,7 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
             ],
             sentence,
             visible_in_log: persistent || found >= MIN_VISIBLE_ROWS,
+            mistakes: 1,
             records,
         })
     };

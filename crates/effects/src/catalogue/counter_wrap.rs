@@ -85,6 +85,7 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
         values: vec![("bits", f64::from(bits))],
         sentence: format!("the log keeps {bits} bits of the counters, which wrap"),
         visible_in_log: true,
+        mistakes: 1,
         records: rewrite_wheels(
             dataset,
             |wheels| {

@@ -223,6 +223,7 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
         values: vec![("probability", missing.rows / (missing.rows + rows))],
         sentence: format!("{} rows are missing, and their counts with them", missing.rows),
         visible_in_log: missing.lost >= MIN_VISIBLE_FAULTS && missing.lost > missing.kept && !missing.uncertain,
+        mistakes: 1,
         records,
     }]
 }

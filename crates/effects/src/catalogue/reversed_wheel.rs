@@ -115,6 +115,7 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
             values: vec![("left", flag(reversed.left)), ("right", flag(reversed.right))],
             sentence: sentence.to_owned(),
             visible_in_log: false,
+            mistakes: u32::from(reversed.left) + u32::from(reversed.right),
             records: rewrite_wheels(dataset, turned, twist),
         }
     };

@@ -93,6 +93,7 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
         values: vec![("swapped", 1.0)],
         sentence: "the left and the right counter are swapped".to_owned(),
         visible_in_log: false,
+        mistakes: 1,
         records: rewrite_wheels(dataset, changed, turned),
     }]
 }

@@ -153,6 +153,7 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
             values: vec![("factor", factor)],
             sentence: format!("{whose} times are off by a factor of {factor:e}"),
             visible_in_log: true,
+            mistakes: 1,
             records,
         })
         .collect()

@@ -254,6 +254,7 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
             values: vec![("probability", restored as f64 / samples as f64), ("jump_counts", jump as f64)],
             sentence: format!("{restored} counts were torn while they were read, off by {jump}"),
             visible_in_log: clear >= MIN_VISIBLE_FAULTS,
+            mistakes: 1,
             records,
         })
     };

@@ -244,6 +244,7 @@ fn correction(dataset: &Dataset, factor: f64, reason: &str) -> RecordCorrection 
         values: vec![("factor", factor)],
         sentence: format!("the wheels are logged {factor:.4} times as far as they went ({reason})"),
         visible_in_log: false,
+        mistakes: 1,
         records,
     }
 }
