@@ -1,7 +1,9 @@
 //! What records show by themselves: cleared counters, descriptions of other robots, lengths of rows.
 #![allow(clippy::print_stdout)] // every case with what was found
 
-use dataset::{Dataset, Displacement, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, WheelLog};
+use dataset::{
+    Dataset, Displacement, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, WheelLog,
+};
 use diagnose::{Document, Options, Verdict, diagnose};
 use kinematics::Increment;
 
@@ -34,6 +36,20 @@ fn a_counter_that_is_cleared_is_named_and_is_no_torn_byte() {
         let off = drive["left_wheel_diameter_m"].value.expect("a value") / scenario.robot.left_wheel_diameter_m - 1.0;
         assert!(off.abs() < 0.02, "{persistent}: {off}");
     }
+}
+
+/// Positions of a robot whose counters are swapped are those of one that drives backward with both counters
+/// reversed; headings tell which it is. A second mistake is less likely than one.
+#[test]
+fn swapped_counters_are_two_reversed_ones_to_an_instrument_without_headings() {
+    let poses = simulated(&robot("[[effect]]\nkind = \"swapped_wheels\"\nswapped = true\n"), 9_230);
+    let mut positions = poses.clone();
+    for sample in positions.runs.iter_mut().flat_map(|run| &mut run.truth) {
+        *sample = TruthSample::new(sample.t_s, sample.x_m, sample.y_m, None);
+    }
+    let first = |dataset: &Dataset| diagnosed(dataset).findings.first().map(|found| found.names.clone());
+    assert_eq!(first(&poses), Some(vec!["swapped_wheels".to_owned()]));
+    assert_eq!(first(&positions), Some(vec!["swapped_wheels".to_owned(), "reversed_wheel".to_owned()]));
 }
 
 /// The records of a robot whose description states other sizes.

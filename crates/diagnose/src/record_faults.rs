@@ -282,3 +282,31 @@ fn batched(datasets: &[Dataset], corrections: fn(&Dataset) -> Vec<RecordCorrecti
     }
     forms
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn faults_that_undo_as_much_are_rivals_each_once_and_the_likeliest_first() {
+        let best = Fault {
+            id: "swapped_wheels",
+            rivals: Vec::new(),
+            values: Vec::new(),
+            sentence: String::new(),
+            records: Vec::new(),
+            gain: 100.0,
+        };
+        let tried = [
+            ("swapped_wheels", false, 100.0),
+            ("reversed_wheel", false, 40.0),
+            ("reversed_wheel", false, 98.0),
+            ("wrong_counts_per_turn", false, 99.0),
+            ("dropped_samples", false, 96.0),
+            ("time_unit", true, 99.5),
+        ];
+        // The margin is 3. Rejects a rival once for each of its forms, and what the log shows by itself.
+        assert_eq!(rivals(&tried, false, &best), [("wrong_counts_per_turn", -1.0), ("reversed_wheel", -2.0)]);
+        assert_eq!(rivals(&tried, true, &best), []);
+    }
+}

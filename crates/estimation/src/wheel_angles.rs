@@ -245,7 +245,8 @@ impl<'a> WheelAngleInterpolator<'a> {
     /// Variances of the wheels' turns at an instant of a row's interval, rad²: an acceleration that is off by
     /// what it changes by from row to row, or by what it changes by in the rows around where that is more, as
     /// what pushes the shafts goes on. A smooth one is off by half of that; one that changes faster than rows
-    /// come, by more than they show. In a row that is not taken to speed up, all of its acceleration is off.
+    /// come, by more than they show. In a row that is not taken to speed up, all of its acceleration is off. A
+    /// wheel that did not turn from row to row stood in between.
     fn interpolated_rad2(&self, row: usize, t_s: f64) -> Wheels<f64> {
         let since_s = t_s - self.t_s[row];
         let left_s = self.t_s.get(row + 1).map_or(0.0, |next_s| next_s - t_s);
@@ -266,7 +267,8 @@ impl<'a> WheelAngleInterpolator<'a> {
         });
         let own = off_by(row).unwrap_or(Wheels::both(0.0));
         let half_s2 = 0.5 * since_s * left_s;
-        own.zip_with(sum, |own, sum| own.max(sum / count.max(1.0)) * half_s2 * half_s2)
+        let off_by = own.zip_with(sum, |own, sum| own.max(sum / count.max(1.0)) * half_s2 * half_s2);
+        off_by.zip_with(self.row_rate(row), |off_by, rate| if rate == 0.0 { 0.0 } else { off_by })
     }
 
     /// Rates of the wheels at an instant of a row's interval, rad/s.
@@ -438,6 +440,29 @@ mod tests {
         // The half of a row at 10 rad/s. Rejects rates at the rows from both sides, which bend the row after
         // a jump: 0.44.
         assert!((turned.right - 0.5).abs() < 1e-12, "{turned:?}");
+    }
+
+    #[test]
+    fn a_long_row_is_off_by_all_of_its_acceleration() {
+        // 20 rad/s², steadily; a row of 0.4 s among rows of 0.2 s is too long to be taken to speed up.
+        let t_s = vec![0.0, 0.2, 0.4, 0.6, 1.0, 1.2, 1.4, 1.6];
+        let angle: Vec<f64> = t_s.iter().map(|t_s| 10.0 * t_s * t_s).collect();
+        let mut dataset = dataset(WheelLog::Angles(Wheels { left: angle.clone(), right: angle }), true);
+        dataset.runs[0].odometry.t_s = t_s;
+        let session = dataset.session();
+        let track = WheelAngleInterpolator::of(&session.runs[0], session.robot).expect("a track");
+        let turned = track.cursor().angle_rad(0.8).expect("spanned").left;
+        let sigma = track.interpolated_rad2(3, 0.8).left.sqrt();
+        // ½ · 20 · 0.2 · 0.2, on either side of the middle. Rejects what an acceleration changes by from row to row,
+        // which is nothing.
+        assert!((turned - 6.4 - 0.4).abs() < 1e-12 && (sigma - 0.4).abs() < 1e-9, "{turned} {sigma}");
+        // A short row follows it.
+        let (turned, sigma) =
+            (track.cursor().angle_rad(0.3).expect("spanned").left, track.interpolated_rad2(1, 0.3).left.sqrt());
+        assert!((turned - 0.9).abs() < 1e-12, "{turned}");
+        // It counts with the rows around, of which the long one and its neighbours are not taken to speed up: the half
+        // of 0.1² and the root of 3 · 20²/5.
+        assert!((sigma - 0.005 * 20.0 * f64::sqrt(0.6)).abs() < 1e-9, "{sigma}");
     }
 
     #[test]

@@ -75,8 +75,8 @@ fn the_gradient_of_rounded_counts_is_that_of_the_cost() {
 
 /// Where a robot is by its counts, the variance of that, and its derivative by a parameter that moves it by
 /// as much, once it was measured twice within a row with an error of 1: each time after going on so far.
-/// Everything is along the robot: P = Q = R = 1.
-fn measured_twice(moved_and_measured: [(f64, f64); 2]) -> [f64; 3] {
+/// Everything is along the robot: P = R = 1, Q = 1 of rounding, or of motion within the row at these instants.
+fn measured_twice(moved_and_measured: [(f64, f64); 2], within_row: Option<[f64; 2]>) -> [f64; 3] {
     use crate::covariances::{Covariance, Covariances};
     use crate::derivatives::Derivatives;
     use crate::filter_state::{FilterState, Step};
@@ -87,7 +87,8 @@ fn measured_twice(moved_and_measured: [(f64, f64); 2]) -> [f64; 3] {
     let model = Model { m_per_rad: Wheels::both(1.0), separation_m: 1e9, ..MODEL };
     let columns = Column::BASE.len();
     // Of the centre, a quarter of both wheels' q²/12.
-    let mut rounding = Rounding::new(Wheels::both(24_f64.sqrt()), columns);
+    let quantum_rad = if within_row.is_some() { 0.0 } else { 24_f64.sqrt() };
+    let mut rounding = Rounding::new(Wheels::both(quantum_rad), columns);
     let (mut pose, mut by) = (Pose::IDENTITY, Derivatives::zeros(columns));
     by.set(0, Vector3::new(1.0, 0.0, 0.0));
     let mut covariance = Covariance::of([&Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 1e-9))]);
@@ -104,7 +105,8 @@ fn measured_twice(moved_and_measured: [(f64, f64); 2]) -> [f64; 3] {
         };
         of(&mut rounding, &mut state);
     };
-    for (moved_m, measured) in moved_and_measured {
+    for (number, (moved_m, measured)) in moved_and_measured.into_iter().enumerate() {
+        let interpolated_rad2 = Wheels::both(within_row.map_or(0.0, |of| 2.0 * of[number]));
         let step = Step {
             motion: Pose::new(moved_m, 0.0, 0.0),
             by_geometry: [Vector3::zeros(); 3],
@@ -116,7 +118,8 @@ fn measured_twice(moved_and_measured: [(f64, f64); 2]) -> [f64; 3] {
         on_state(&mut |rounding, state| {
             rounding.advance(&step);
             state.advance(&step);
-            rounding.enter(state, [1.0, 1.0], Wheels::both(0.0), &model);
+            rounding.pass(state, false);
+            rounding.enter(state, [1.0, 1.0], interpolated_rad2, &model);
             let (h, v) = (Vector3::x(), measured - state.pose.x_m);
             let ph = Vector3::from(state.covariance.along(&h).map(|[along]| along));
             let gain = ph / (h.dot(&ph) + 1.0);
@@ -134,7 +137,7 @@ fn measured_twice(moved_and_measured: [(f64, f64); 2]) -> [f64; 3] {
 /// better than a count. By hand for n = 2: P − P²/(P + Q + R/n) = 0.6, and z⁺ = ȳ·P/(P + Q + R/n).
 #[test]
 fn a_standstill_does_not_average_rounding_out() {
-    let [x_m, variance, by] = measured_twice([(0.0, 2.0), (0.0, 4.0)]);
+    let [x_m, variance, by] = measured_twice([(0.0, 2.0), (0.0, 4.0)], None);
     // Rejects rounding that is new at each measurement, 1 − 1/(1 + 2/2) = 0.5, and none at all, 1/3.
     assert!((variance - 0.6).abs() < 1e-12, "{variance}");
     assert!((x_m - 3.0 / 2.5).abs() < 1e-12 && (by - 0.6).abs() < 1e-12, "{x_m} {by}");
@@ -145,8 +148,18 @@ fn a_standstill_does_not_average_rounding_out() {
 #[test]
 fn a_rows_error_goes_along_with_the_robot() {
     // Measured at 2, then at 7 after five metres: as two measurements of 2 at the first place.
-    let [x_m, variance, _] = measured_twice([(0.0, 2.0), (5.0, 7.0)]);
+    let [x_m, variance, _] = measured_twice([(0.0, 2.0), (5.0, 7.0)], None);
     // Rejects counts that stay where they were: 0.4 of five metres. The heading's variance of 1e-9 adds its
     // 25-fold across.
     assert!((x_m - (5.0 + 2.0 / 2.5)).abs() < 1e-6 && (variance - 0.6).abs() < 1e-6, "{x_m} {variance}");
+}
+
+/// What nobody recorded of the motion within a row is nothing at its end. By hand: the first measurement, of Q + R
+/// = 2, leaves P = 2/3 and the counts at 2/3; the second, at the row's end, is of R = 1 alone.
+#[test]
+fn the_motion_within_a_row_is_no_error_at_its_end() {
+    let [x_m, variance, _] = measured_twice([(0.0, 2.0), (0.0, 4.0)], Some([1.0, 0.0]));
+    // Rejects an error that the robot takes along to the row's end, as it does with the rounding of counts: 0.6.
+    assert!((variance - 0.4).abs() < 1e-12, "{variance}");
+    assert!((x_m - (2.0 / 3.0 + 0.4 * (4.0 - 2.0 / 3.0))).abs() < 1e-12, "{x_m}");
 }
