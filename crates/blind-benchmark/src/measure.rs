@@ -247,6 +247,28 @@ fn names(cases: &[CaseResult]) -> Vec<Measure> {
             true,
         ),
     ];
+    // What the oracle itself does not detect nobody can name.
+    let visible = || aliased().filter(|(hidden, ..)| hidden.ratio.is_some_and(|ratio| ratio >= 1.0));
+    measures.extend([
+        share(
+            "set_holds_above_limit",
+            "aliased, above the oracle's limit: the set holds the right name",
+            count(visible(), |(_, identification_outcome, _)| {
+                matches!(identification_outcome, IdentificationOutcome::First | IdentificationOutcome::InSet)
+            }),
+            0.96,
+            false,
+        ),
+        share(
+            "single_wrong_name_above_limit",
+            "aliased, above the oracle's limit: a single wrong name",
+            count(visible(), |(_, identification_outcome, _)| {
+                *identification_outcome == IdentificationOutcome::WrongName
+            }),
+            0.02,
+            true,
+        ),
+    ]);
     // Of means alone: there the oracle has sets.
     let sizes: Vec<(f64, f64)> = aliased()
         .filter(|(hidden, _, _)| hidden.kind == EffectKind::Mean)

@@ -203,7 +203,8 @@ pub(crate) fn of_failed_checks(checked: &Checked, without: &[String]) -> Option<
     let only_correlated = failed.iter().all(|check| matches!(check, Check::Whiteness(_)));
     let sign = only_correlated.then_some(Sign::AutocorrelatedErrors);
     let errors = sign.into_iter().flat_map(|sign| with_sign(sign, without)).map(Cause::Effect);
-    let causes = errors.chain([Cause::Unknown]).collect();
+    // Whatever else was left out of the model is as likely, and has no name.
+    let causes = [Cause::Unknown].into_iter().chain(errors).collect();
     Some(of_causes(causes, worst, BTreeMap::new(), Basis::FailedTests(failed)))
 }
 

@@ -13,11 +13,11 @@ use crate::candidate::{Candidate, terms};
 use crate::check::{Check, TestResult};
 use crate::finding;
 use crate::fit_cache::FitCache;
-use crate::model_comparison::{log_bayes_factor, log_odds_margin, relative_odds};
+use crate::model_comparison::{log_bayes_factor, margin_over_units, odds_within};
 use crate::record_faults::sessions;
 use crate::residual_tests::{Checked, check};
 use crate::selection::{SearchResult, search, search_ungated};
-use crate::settings::levels::{MIN_LOG_ODDS_MARGIN, SCAN_LEVEL, SPARSE_TERM_LEVEL};
+use crate::settings::levels::{SCAN_LEVEL, SPARSE_TERM_LEVEL};
 use crate::settings::search::{AUTOCORRELATION_SIGMAS, MIN_AUTOCORRELATION, SCAN_LEVEL_IF_DEPENDENT};
 use crate::sparse_terms::{SparseSearch, UncataloguedTerms, sparse};
 
@@ -140,13 +140,15 @@ fn compare_with_sparse<'a>(base: &ModelFit<'a>, model: MeanModel<'a>) -> MeanMod
     let Some(sparse_search) = SparseSearch::beside(1.0, base, &without) else { return model };
     let named = log_bayes_factor(&without.fit, &model.found.model);
     let finding = sparse_search.finding(SPARSE_TERM_LEVEL);
-    let unnamed = finding
-        .as_ref()
-        .map_or_else(|| sparse_search.log_bayes_factor(), |sparse| sparse_search.log_bayes_factor_of(&sparse.model));
-    let Some(term) = finding.filter(|_| unnamed > named + log_odds_margin(named)) else {
-        // The prior of an uncatalogued cause is lower.
-        let unnamed = unnamed + finding::uncatalogued_log_odds();
-        let competing = Some(relative_odds(unnamed, named)).filter(|_| unnamed > named - MIN_LOG_ODDS_MARGIN);
+    let Some(likeliest) = finding.as_ref().map(|found| &found.model).or_else(|| sparse_search.likeliest()) else {
+        return model;
+    };
+    let unnamed = sparse_search.log_bayes_factor_of(likeliest);
+    // The prior of an uncatalogued cause is lower.
+    let more = unnamed + finding::uncatalogued_log_odds() - named;
+    let margin = margin_over_units(named, likeliest, &model.found.model);
+    let Some(term) = finding.filter(|_| more > margin) else {
+        let competing = Some(odds_within(more, margin).min(1.0)).filter(|_| more > -margin);
         return MeanModel { competing, ..model };
     };
     let instead = UncataloguedTerms::from(base, term);

@@ -6,7 +6,7 @@ use estimation::ModelFit;
 use crate::augmented_model::{AugmentedModel, cost, count};
 use crate::candidate::terms;
 use crate::scan::log_occam_factor;
-use crate::settings::levels::{MIN_LOG_ODDS_MARGIN, MODEL_MISMATCH_FRACTION};
+use crate::settings::levels::{MIN_LOG_ODDS_MARGIN, MODEL_MISMATCH_FRACTION, NORMAL_QUANTILE_ONE_SIDED_95};
 use crate::wald::wald_test;
 
 /// Largest difference in log odds from the best cause at which a cause is not discriminated.
@@ -14,10 +14,38 @@ pub(crate) fn log_odds_margin(best: f64) -> f64 {
     MIN_LOG_ODDS_MARGIN.max(MODEL_MISMATCH_FRACTION * best)
 }
 
+/// The same of two models whose log likelihoods differ from unit to unit, runs or blocks where these are few: their
+/// sum over n units with the standard deviation s scatters by √n s (Vehtari & Lampinen 2002), and a few units that
+/// one of them suits decide nothing.
+pub(crate) fn margin_over_units(best: f64, one: &AugmentedModel<'_>, other: &AugmentedModel<'_>) -> f64 {
+    let costs = |model: &AugmentedModel<'_>| -> Vec<((usize, usize), f64)> {
+        let units = model.fit.units(&mut terms(&model.candidates));
+        units.iter().map(|unit| (unit.run, unit.cost())).collect()
+    };
+    let (one, other) = (costs(one), costs(other));
+    let are_paired = one.len() == other.len() && one.iter().zip(&other).all(|(one, other)| one.0 == other.0);
+    let differences: Vec<f64> = one.iter().zip(&other).map(|((_, one), (_, other))| one - other).collect();
+    let sigma = if are_paired { sigma_of_sum(&differences) } else { 0.0 };
+    log_odds_margin(best).max(NORMAL_QUANTILE_ONE_SIDED_95 * sigma)
+}
+
+/// Standard error of the sum of independent values; 0 of a single one, which does not scatter.
+fn sigma_of_sum(values: &[f64]) -> f64 {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    if values.len() > 1 { (count * squares / (count - 1.0)).sqrt() } else { 0.0 }
+}
+
 /// Odds of a cause over the best one. Where log odds are in the thousands, they are scaled down: the form
 /// of a hypothesis is not known well enough for the last of them to count in full.
 pub(crate) fn relative_odds(log_odds: f64, best: f64) -> f64 {
-    ((log_odds - best) * MIN_LOG_ODDS_MARGIN / log_odds_margin(best)).exp()
+    odds_within(log_odds - best, log_odds_margin(best))
+}
+
+/// Odds for a difference of log odds of which so much is no difference.
+pub(crate) fn odds_within(difference: f64, margin: f64) -> f64 {
+    (difference * MIN_LOG_ODDS_MARGIN / margin).exp()
 }
 
 /// Log Bayes factor of a model over its base.
@@ -57,4 +85,16 @@ pub(crate) fn regated<'a>(
     let outliers = |model: &AugmentedModel<'_>| model.fit.solution.pass.outliers.len();
     let (before, after) = (log_bayes_factor(base, found), log_bayes_factor(base, &model) - log_trials);
     (outliers(&model) < outliers(found) && after > before + log_odds_margin(before)).then_some(model)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sum_over_units_scatters_as_they_do() {
+        // Mean 2, variance (1 + 0 + 1)/2: √3. Rejects a mean's standard error, 1/√3.
+        assert!((sigma_of_sum(&[1.0, 2.0, 3.0]) - 3_f64.sqrt()).abs() < 1e-12);
+        assert_eq!(sigma_of_sum(&[5.0]), 0.0);
+    }
 }

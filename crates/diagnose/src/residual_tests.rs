@@ -221,8 +221,9 @@ fn anscombe_glynn(kurtosis: f64, n: f64) -> f64 {
 /// error. But where displacements are differences of measurements, one error spoils two of them, and both
 /// together are right.
 fn outliers(fit: &ModelFit<'_>) -> Outliers {
-    let mut found = Outliers { measurements: innovations(fit, 0).len(), ..Outliers::default() };
-    let rejected = &fit.solution.pass.outliers;
+    let mut found = Outliers { measurements: tested(fit, 0).len(), ..Outliers::default() };
+    let rejected = fit.solution.pass.outliers.iter().copied();
+    let rejected: Vec<_> = rejected.filter(|of| is_tested_by_size(fit, *of)).collect();
     let phase = fit.solution.pass.innovations.first().map_or(&[][..], Vec::as_slice);
     let mut cancelled_by = None;
     for (position, &(segment, measurement)) in rejected.iter().enumerate() {

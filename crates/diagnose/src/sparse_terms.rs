@@ -226,12 +226,12 @@ impl<'m, 'a> SparseSearch<'m, 'a> {
             })
     }
 
-    /// Log Bayes factor of the likeliest of them, corrected for the trials.
-    pub(crate) fn log_bayes_factor(&self) -> f64 {
-        self.refitted.iter().map(|model| self.log_bayes_factor_of(model)).fold(f64::NEG_INFINITY, f64::max)
+    /// The likeliest of them.
+    pub(crate) fn likeliest(&self) -> Option<&AugmentedModel<'a>> {
+        self.refitted.iter().max_by(|a, b| self.log_bayes_factor_of(a).total_cmp(&self.log_bayes_factor_of(b)))
     }
 
-    /// The same under one of them.
+    /// Log Bayes factor of one of them, corrected for the trials.
     pub(crate) fn log_bayes_factor_of(&self, model: &AugmentedModel<'a>) -> f64 {
         log_bayes_factor(&self.model.fit, model) - log_trials(self.trials)
     }
