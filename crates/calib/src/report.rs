@@ -463,4 +463,18 @@ mod tests {
         assert_eq!(geometry.wheel_diameter_m().right, 0.09);
         assert_eq!(geometry.wheel_separation_m(), 0.2);
     }
+
+    #[test]
+    fn a_file_of_the_limit_is_read_and_a_longer_one_refused() {
+        let path = std::env::temp_dir().join(format!("yair-calibration-{}.toml", std::process::id()));
+        let mut text = "methods = []\n#".to_owned();
+        text.push_str(&"x".repeat(MAX_FILE_BYTES as usize - text.len()));
+        std::fs::write(&path, &text).expect("written");
+        let of_the_limit = CalibrationReport::read(&path);
+        std::fs::write(&path, text + "x").expect("written");
+        let longer = CalibrationReport::read(&path);
+        std::fs::remove_file(&path).expect("removed");
+        assert!(of_the_limit.is_ok_and(|report| report.methods.is_empty()));
+        assert!(longer.expect_err("refused").to_string().contains("more than 1048576 bytes"));
+    }
 }
