@@ -180,7 +180,7 @@ mod tests {
         let mut text = "int32 a #".to_owned();
         text.push_str(&"x".repeat(MAX_DEFINITION_BYTES as usize - text.len()));
         std::fs::write(&file, &text).expect("written");
-        assert!(KnownTypes::with_files(&[given.clone()]).is_ok());
+        assert!(KnownTypes::with_files(std::slice::from_ref(&given)).is_ok());
         std::fs::write(&file, text + "x").expect("written");
         let refused = KnownTypes::with_files(&[given]).expect_err("refused").to_string();
         assert!(refused.contains("longer than 1024 KiB"), "{refused}");

@@ -26,8 +26,7 @@ pub(crate) const MIN_EXPANDED_BYTES: u64 = 1 << 30;
 pub(crate) const MAX_DECLARED_BYTES: usize = 64 << 20;
 
 /// Bytes. Shortest row of the messages in a file of SQLite, which has room for so many rows and no more.
-/// Derived: pointer to the cell 2, length and number of the row 1 each, head of the record 1, and 1 for each of
-/// 3 columns.
+/// Derived: pointer to the cell 2; length and number of the row, head of the record and 3 columns 1 each.
 #[cfg(feature = "db3")]
 pub(crate) const MIN_SQLITE_ROW_BYTES: u64 = 8;
 

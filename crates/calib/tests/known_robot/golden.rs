@@ -33,8 +33,11 @@ fn sets() -> [(&'static str, Dataset); 3] {
         sample.x_m *= 1.1;
         sample.y_m *= 1.1;
     }
-    let marks = Log { is_marks: true, ..Log::noisy(3) };
-    [("poses", Log::noisy(1).dataset()), ("beside", beside), ("marks", marks.dataset())]
+    let mut marks = Log { is_marks: true, ..Log::noisy(3) }.dataset();
+    // A mark that was misread by what is stated of readings.
+    marks.truth_noise.sigma_xy_m = Some(0.03);
+    marks.runs[2].point_readings[3].room.x_m += 0.05;
+    [("poses", Log::noisy(1).dataset()), ("beside", beside), ("marks", marks)]
 }
 
 /// Runs of some protocols alone.
