@@ -168,33 +168,3 @@ pub(crate) fn mutated(file: &[u8], random: &mut impl Rng) -> Vec<u8> {
     }
     bytes
 }
-
-/// A file of SQLite with some bytes changed, most of them in the heads of pages and the pointers behind these,
-/// some lengths and pages copied over each other; or cut off.
-#[cfg(feature = "db3")]
-pub(crate) fn mutated_pages(file: &[u8], random: &mut impl Rng) -> Vec<u8> {
-    const PAGE: usize = 4096;
-    /// The head of a page with its first pointers to cells, bytes.
-    const HEAD: usize = 40;
-    let mut bytes = file.to_vec();
-    let pages = bytes.len() / PAGE;
-    for _ in 0..random.random_range(1..6) {
-        let page = PAGE * random.random_range(0..pages);
-        let within = if random.random_bool(0.6) { HEAD } else { PAGE - 4 };
-        let at = page + random.random_range(0..within);
-        match random.random_range(0..5) {
-            0 => bytes[at] = random.random(),
-            1 => bytes[at] ^= 1 << random.random_range(0..8),
-            2 => bytes[at..at + 4].copy_from_slice(&random.random_range(0..2 * pages as u32).to_be_bytes()),
-            3 => bytes[at..at + 2].copy_from_slice(&[0xff, 0x7f]),
-            _ => {
-                let other = PAGE * random.random_range(0..pages);
-                bytes.copy_within(other..other + PAGE, page);
-            }
-        }
-    }
-    if random.random_bool(0.05) {
-        bytes.truncate(random.random_range(0..file.len()));
-    }
-    bytes
-}

@@ -74,15 +74,6 @@ pub(crate) fn bags() -> Vec<Sample> {
     ["zstd.mcap", "two_topics.mcap"].map(|name| vec![named(&root().join("tests/ros2").join(name))]).into()
 }
 
-#[cfg(feature = "db3")]
-pub(crate) fn sqlite() -> Vec<Sample> {
-    let (_, compressed) = named(&root().join("tests/ros2/humble.db3.zstd"));
-    let mut bytes = Vec::new();
-    let mut decoder = ruzstd::decoding::StreamingDecoder::new(&compressed[..]).expect("zstd");
-    std::io::Read::read_to_end(&mut decoder, &mut bytes).expect("zstd");
-    vec![vec![("a.db3".to_owned(), bytes)]]
-}
-
 pub(crate) fn metadata() -> Vec<Sample> {
     together("fuzz/corpus/bag")
 }

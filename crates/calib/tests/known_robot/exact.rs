@@ -48,6 +48,16 @@ fn every_method_gives_an_exact_robot_back() {
 }
 
 #[test]
+fn joint_names_the_run_that_it_could_not_use() {
+    let mut dataset = Log::exact().dataset();
+    dataset.runs[2].truth.truncate(1);
+    let found = calib::method("joint").expect("known").calibrate(&[dataset.session()]).expect("a calibration");
+    let [rejected] = &found.runs_rejected[..] else { panic!("{:?}", found.runs_rejected) };
+    assert!(rejected.run == "2" && rejected.why.contains("fewer than two measurements"), "{rejected:?}");
+    assert_eq!(found.runs_used, dataset.runs.len() - 1);
+}
+
+#[test]
 fn every_method_says_what_it_is_and_what_to_drive_for_it() {
     for method in METHODS {
         let (name, about) = (method.name(), method.about());
