@@ -179,6 +179,18 @@ fn regress_a_term_with_an_infinite_standard_deviation_is_no_finding() {
     mended("diagnosis", &[8_009_561]);
 }
 
+/// All poses were received before the wheels or after them, and the run had nothing to be compared with.
+#[test]
+fn regress_a_bag_whose_poses_are_all_outside_of_its_wheels_is_refused() {
+    mended("mcap-and-cdr", &[20_005_468, 20_012_028]);
+}
+
+/// One stamp was 10¹⁶ s before all others, which were one double from there.
+#[test]
+fn regress_stamps_that_are_one_double_after_the_first_row_are_refused() {
+    mended("csv", &[30_012_305, 30_023_822]);
+}
+
 #[test]
 fn regress_messages_do_not_say_inf_times_and_inf_turns() {
     mended("calibrators", &[7_100_223, 7_128_401, 7_142_279]);

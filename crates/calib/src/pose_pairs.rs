@@ -251,4 +251,14 @@ mod tests {
         assert!(Delta::new(1.0, DeltaUnit::Metres, true, -0.1).is_err());
         assert_eq!(Delta::default().describe(), "1 pose, consecutive pairs");
     }
+
+    #[test]
+    fn more_pairs_than_are_held_are_refused() {
+        // Every second pose is turned by a radian: half of the pairs of two poses are a step apart.
+        let count = 2 * (MAX_PAIRS as f64).sqrt() as usize + 10;
+        let poses: Vec<Pose> = (0..count).map(|number| Pose::new(0.0, 0.0, f64::from(number % 2 == 1))).collect();
+        let found = |poses: &[Pose]| pairs(poses, 1.0, DeltaUnit::Radians, true);
+        assert!(found(&poses).expect_err("refused").contains("more than 10 million pairs"));
+        assert_eq!(found(&poses[..4]).expect("pairs"), [(0, 1), (0, 3), (1, 2), (2, 3)]);
+    }
 }

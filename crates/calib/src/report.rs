@@ -434,6 +434,14 @@ mod tests {
         }
     }
 
+    const ROBOT: NominalRobot = NominalRobot {
+        left_wheel_diameter_m: 0.08,
+        right_wheel_diameter_m: 0.09,
+        wheel_separation_m: 0.2,
+        ticks_per_rev: Some(1000.0),
+        counter_bits: None,
+    };
+
     #[test]
     fn a_calibration_file_reads_back_as_it_was_written() {
         let text = report().to_toml().expect("serialises");
@@ -449,18 +457,44 @@ mod tests {
 
     #[test]
     fn what_a_calibration_does_not_say_stays_nominal() {
-        let robot = NominalRobot {
-            left_wheel_diameter_m: 0.08,
-            right_wheel_diameter_m: 0.09,
-            wheel_separation_m: 0.2,
-            ticks_per_rev: Some(1000.0),
-            counter_bits: None,
-        };
+        let robot = ROBOT;
         let calibration =
             NamedCalibration { name: "x".to_owned(), values: [("left_m_per_tick".to_owned(), 3e-4)].into() };
         let geometry = calibration.geometry(&robot, robot.geometry().expect("valid")).expect("valid");
         assert_eq!(geometry.wheel_diameter_m().left, 0.3 / std::f64::consts::PI);
         assert_eq!(geometry.wheel_diameter_m().right, 0.09);
         assert_eq!(geometry.wheel_separation_m(), 0.2);
+    }
+
+    #[test]
+    fn values_far_from_the_nominal_ones_are_of_another_robot_and_farther_ones_of_none() {
+        let said = |key: &str, value: f64| {
+            let values = BTreeMap::from([(key.to_owned(), value)]);
+            let found = NamedCalibration { name: "x".to_owned(), values };
+            (found.other_robot(&ROBOT).is_some(), found.implausible_for(&ROBOT).is_some())
+        };
+        for (key, nominal_m, limits) in [
+            ("left_wheel_diameter_m", 0.08, [MAX_EVALUATED_DIAMETER_RATIO, 1.3]),
+            ("right_wheel_diameter_m", 0.09, [MAX_EVALUATED_DIAMETER_RATIO, 1.3]),
+            ("wheel_separation_m", 0.2, [MAX_EVALUATED_SEPARATION_RATIO, 2.2]),
+        ] {
+            let at = |ratio: f64| [said(key, nominal_m * ratio), said(key, nominal_m / ratio)];
+            assert_eq!(at(0.99 * limits[0]), [(false, false); 2], "{key}");
+            assert_eq!(at(1.01 * limits[0]), [(true, false); 2], "{key}");
+            assert_eq!(at(1.01 * limits[1]), [(true, true); 2], "{key}");
+        }
+    }
+
+    #[test]
+    fn a_file_of_the_limit_is_read_and_a_longer_one_refused() {
+        let path = std::env::temp_dir().join(format!("yair-calibration-{}.toml", std::process::id()));
+        let text = format!("{:x<1$}", "methods = []\n#", MAX_FILE_BYTES as usize);
+        std::fs::write(&path, &text).expect("written");
+        let of_the_limit = CalibrationReport::read(&path);
+        std::fs::write(&path, text + "x").expect("written");
+        let longer = CalibrationReport::read(&path);
+        std::fs::remove_file(&path).expect("removed");
+        assert!(of_the_limit.is_ok_and(|report| report.methods.is_empty()));
+        assert!(longer.expect_err("refused").to_string().contains("more than 1048576 bytes"));
     }
 }

@@ -161,6 +161,16 @@ mod tests {
     }
 
     #[test]
+    fn a_message_of_the_limit_is_decoded_and_a_longer_one_refused() {
+        let of = definitions("uint8[] q\n");
+        let mut message = vec![0; MAX_MESSAGE_BYTES];
+        message[1] = 1;
+        assert!(decode(&of, &message).is_ok());
+        message.push(0);
+        assert!(decode(&of, &message).expect_err("refused").contains("wheels and poses take at most 4194304"));
+    }
+
+    #[test]
     fn strings_sequences_arrays_and_nested_types_follow_each_other() {
         let of = definitions(
             "string s\nuint16[] q\nI[2] p\nfloat64[<=3] none\nuint8 last\n===\nMSG: t/I\nuint8 x\nuint32 y\n",

@@ -211,4 +211,16 @@ mod tests {
         assert!(refused("===\nIDL: a/msg/B\n").contains("ros2idl"));
         assert!(refused("wstring a").contains("wstring"));
     }
+
+    #[test]
+    fn types_and_fields_beyond_their_limits_are_refused() {
+        let fields = |count: usize| "int8 a\n".repeat(count);
+        let types = |count: usize| (0..count).map(|number| format!("===\nMSG: a/T{number}\n")).collect::<String>();
+        let parse = |text: &str| Definitions::parse("a/msg/B", text);
+        // The root is a type too.
+        assert!(parse(&fields(MAX_FIELDS)).is_ok() && parse(&types(MAX_TYPES)).is_ok());
+        for text in [fields(MAX_FIELDS + 1), types(MAX_TYPES + 2)] {
+            assert!(parse(&text).expect_err("refused").contains("more than 1000 types or 1000 fields"));
+        }
+    }
 }

@@ -351,6 +351,15 @@ fn assemble(
     if let Some(cut_s) = options.cut_s.filter(|_| runs.is_empty()) {
         return Err(RosBagError::NothingLeft { cut_s });
     }
+    let is_seen = |run: &Run| !run.truth.is_empty() || run.has_gyro();
+    if has_poses && options.scan.is_none() && !runs.iter().any(is_seen) {
+        let why = format!(
+            "none of its {} poses lies between the first and the last message of {}, by their times and their times of receipt; record both at once",
+            truth_rows.len(),
+            both.wheels.topic
+        );
+        return Err(RosBagError::Unusable { topic: poses.topic.clone(), type_name: poses.type_name.clone(), why });
+    }
     warnings.extend(gyro.and_then(|gyro| gyro.gaps()));
     let outside = truth_rows.len() - seen.len();
     if outside > 0 {

@@ -173,6 +173,20 @@ mod tests {
     }
 
     #[test]
+    fn a_file_of_the_limit_defines_a_type_and_a_longer_one_is_refused() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("long.msg");
+        let given = PathBuf::from(format!("my_msgs/Long={}", file.display()));
+        let mut text = "int32 a #".to_owned();
+        text.push_str(&"x".repeat(MAX_DEFINITION_BYTES as usize - text.len()));
+        std::fs::write(&file, &text).expect("written");
+        assert!(KnownTypes::with_files(std::slice::from_ref(&given)).is_ok());
+        std::fs::write(&file, text + "x").expect("written");
+        let refused = KnownTypes::with_files(&[given]).expect_err("refused").to_string();
+        assert!(refused.contains("longer than 1024 KiB"), "{refused}");
+    }
+
+    #[test]
     fn files_define_types_by_their_folders_or_as_said() {
         let folder = tempfile::tempdir().expect("a folder");
         let inside = folder.path().join("my_msgs/msg");

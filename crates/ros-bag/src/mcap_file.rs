@@ -35,7 +35,7 @@ impl Channel {
     }
 
     /// Of its texts.
-    fn bytes(&self) -> usize {
+    pub(crate) fn bytes(&self) -> usize {
         let Self { topic, type_name, message_encoding, schema_encoding, definition } = self;
         [topic, type_name, message_encoding, schema_encoding, definition].iter().map(|text| text.len()).sum()
     }

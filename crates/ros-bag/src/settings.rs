@@ -25,6 +25,11 @@ pub(crate) const MIN_EXPANDED_BYTES: u64 = 1 << 30;
 /// Budgeted: some ten kilobytes a topic, of some thousand topics.
 pub(crate) const MAX_DECLARED_BYTES: usize = 64 << 20;
 
+/// Bytes. Shortest row of the messages in a file of SQLite, which has room for so many rows and no more.
+/// Derived: pointer to the cell 2; length and number of the row, head of the record and 3 columns 1 each.
+#[cfg(feature = "db3")]
+pub(crate) const MIN_SQLITE_ROW_BYTES: u64 = 8;
+
 /// Places of a file at which records no longer follow each other; what stands behind the last is left out.
 /// Budgeted: at each, the rest of the file may be read once more.
 pub(crate) const MAX_BREAKS: usize = 100;

@@ -1,0 +1,6 @@
+//! Methods on logs of a robot whose wheels and wheelbase are known.
+
+mod exact;
+mod golden;
+mod log;
+mod scatter;
