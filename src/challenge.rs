@@ -1,5 +1,5 @@
-//! `yair challenge [--cases N] [--seed S] [--instrument NAME] [--case K [--out DIR]] [--shard I/N --out DIR] [--merge DIR...]
-//! [--check BASELINE [--update]]`
+//! `yair challenge [--cases N] [--seed S] [--instrument NAME] [--case K [--out DIR]] [--shard I/N --out DIR]
+//! [--merge DIR...] [--check BASELINE [--update]]`
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
