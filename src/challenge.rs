@@ -1,13 +1,13 @@
-//! `yair challenge [--cases N] [--seed S] [--case K [--out DIR]] [--shard I/N --out DIR] [--merge DIR...]
-//! [--check BASELINE [--update]]`
+//! `yair challenge [--cases N] [--seed S] [--instrument NAME] [--case K [--out DIR]] [--shard I/N --out DIR]
+//! [--merge DIR...] [--check BASELINE [--update]]`
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
 use blind_benchmark::{
-    CaseResult, ChallengeResult, DiagnosisBaseline, DiagnosisCheck, Measure, Scope, challenge_case, challenge_datasets,
-    challenge_outcomes,
+    CaseInstrument, CaseResult, ChallengeResult, DiagnosisBaseline, DiagnosisCheck, Measure, Scope, challenge_case,
+    challenge_datasets, challenge_outcomes,
 };
 use clap::Args;
 use dataset::Existing;
@@ -34,13 +34,17 @@ pub(crate) struct Arguments {
     /// Hide large effects alone: one of the mean in each case, at ten to a hundred of its detection limits.
     #[arg(long, conflicts_with = "check")]
     large: bool,
+    /// See every case by one instrument: capture, slam, gyro-tape, wall or revisit. Even cases are nulls, odd
+    /// ones hide one effect that the instrument can show.
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["check", "large"])]
+    instrument: Option<CaseInstrument>,
     /// Drive part I of N only and leave it in the folder of --out; --merge puts the parts together. auto: as
     /// of yair sweep.
     #[arg(long, value_name = "I/N|auto", requires = "out", group = "writes")]
     shard: Option<ShardChoice>,
     /// Put the parts of a campaign in these folders together, in any order; the result is that of one
     /// machine, to the bit.
-    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["cases", "seed", "case", "large", "shard", "out", "jobs"])]
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["cases", "seed", "case", "large", "instrument", "shard", "out", "jobs"])]
     merge: Vec<PathBuf>,
     /// Write the datasets of --case, one folder a session, or the part of --shard into this folder.
     #[arg(long, value_name = "DIR", requires = "writes")]
@@ -74,6 +78,9 @@ const MAX_SHOWN: usize = 60;
 
 impl Arguments {
     fn scope(&self) -> Scope {
+        if let Some(instrument) = self.instrument {
+            return Scope::Instrument(instrument);
+        }
         match (self.large, self.check.is_some()) {
             (true, _) => Scope::Large,
             (false, true) => Scope::Guarded,

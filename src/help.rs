@@ -71,6 +71,7 @@ const GROUPS: &[(&str, &[Entry])] = &[
                 "challenge",
                 &[
                     "yair challenge --cases 60",
+                    "yair challenge --instrument gyro-tape --cases 300 --seed 7",
                     "yair challenge --cases 440 --seed 23 --check baseline.json",
                     "yair challenge --cases 2000 --shard 1/4 --out part-1",
                     "yair challenge --merge part-1 part-2 part-3 part-4",

@@ -5,6 +5,7 @@ use dataset::Dataset;
 use effects::Needs;
 use kinematics::DriveGeometry;
 
+use super::case_instrument::CaseInstrument;
 use super::conditions::Conditions;
 #[cfg(test)]
 use super::conditions::Stamps;
@@ -46,6 +47,7 @@ impl CaseKind {
     pub(crate) const fn in_scope(scope: Scope, number: u64) -> (Self, u64) {
         match scope {
             Scope::Large => (Self::Large, number),
+            Scope::Instrument(_) => (if number.is_multiple_of(2) { Self::Null } else { Self::Single }, number / 2),
             Scope::Whole | Scope::Guarded => Self::of(number),
         }
     }
@@ -84,6 +86,7 @@ pub(crate) struct Case {
     pub(crate) conditions: Conditions,
     pub(crate) robot: RandomRobot,
     pub(crate) instrument_model: InstrumentModel,
+    instrument: Option<CaseInstrument>,
     pub(crate) hidden: Vec<Hidden>,
     pub(crate) oracle: Vec<OracleView>,
     pub(crate) datasets: Vec<Dataset>,
@@ -129,9 +132,11 @@ impl Case {
         let (case_kind, index) = CaseKind::in_scope(scope, number);
         let mut unresolved_robots = 0;
         for attempt in 0..ATTEMPTS {
-            // Two that show on the same paths must be met; which, is drawn anew.
-            let ids = Self::ids(seed, number, case_kind, index, if case_kind == CaseKind::Pair { attempt } else { 0 });
-            match Self::attempt(seed, number, case_kind, &ids, attempt)? {
+            // Two that show on the same paths must be met, and one that the instrument can see; which, is drawn
+            // anew.
+            let is_drawn_anew = case_kind == CaseKind::Pair || scope.instrument().is_some();
+            let ids = Self::ids(seed, number, case_kind, index, if is_drawn_anew { attempt } else { 0 });
+            match Self::attempt(CaseDraws { seed, case: number, attempt }, case_kind, scope.instrument(), &ids)? {
                 Attempt::Ready(case) => return Ok(Ok(Self { unresolved_robots, ..*case })),
                 Attempt::Unresolved => unresolved_robots += 1,
                 Attempt::Undetectable => {}
@@ -175,25 +180,38 @@ impl Case {
     }
 
     fn attempt(
-        seed: u64,
-        number: u64,
+        draws: CaseDraws,
         case_kind: CaseKind,
+        instrument: Option<CaseInstrument>,
         ids: &[&'static str],
-        attempt: u64,
     ) -> Result<Attempt, ChallengeError> {
-        let draws = CaseDraws { seed, case: number, attempt };
+        let CaseDraws { seed, case: number, .. } = draws;
         let needs = ids.iter().fold(Needs::default(), |all, id| all.and(Hidden::needs(id)));
-        let conditions = Conditions::draw(draws, needs, ids);
-        let instrument_model = InstrumentModel::draw(draws, &conditions);
+        let drawn = Conditions::draw(draws, needs, ids);
+        let conditions = instrument.map_or(drawn, |instrument| instrument.conditions(drawn));
+        let instrument_model = match instrument {
+            Some(instrument) => instrument.model(&conditions),
+            None => InstrumentModel::draw(draws, &conditions),
+        };
         let robot = RandomRobot::draw(draws, &conditions, instrument_model.rate_hz, needs)?;
+        let robot = match instrument {
+            Some(instrument) => instrument.robot(robot, draws),
+            None => robot,
+        };
         let mut draw = draws.of("hidden");
         let mut hidden = Vec::new();
         for id in ids {
             let Some(effect) = Hidden::draw(id, &robot, &mut draw) else { return Ok(Attempt::Undetectable) };
             hidden.push(effect);
         }
-        let measurement =
-            DriveContext { seed, number, conditions: &conditions, robot: &robot, instrument_model: &instrument_model };
+        let measurement = DriveContext {
+            seed,
+            number,
+            conditions: &conditions,
+            robot: &robot,
+            instrument_model: &instrument_model,
+            instrument,
+        };
         let truth = robot.sessions[0].scenario.true_geometry().map_err(sim_yair::SimulationError::from)?;
         let ratios = match case_kind {
             CaseKind::Pair => PAIR_RATIOS,
@@ -262,6 +280,7 @@ impl Case {
             case_kind,
             conditions,
             instrument_model,
+            instrument,
             hidden,
             oracle,
             datasets,
@@ -305,6 +324,7 @@ impl Case {
             conditions: &self.conditions,
             robot: &self.robot,
             instrument_model: &self.instrument_model,
+            instrument: self.instrument,
         }
     }
 
@@ -432,6 +452,7 @@ impl Trial {
                 conditions: &conditions,
                 robot: &robot,
                 instrument_model: &instrument_model,
+                instrument: None,
             };
             let plain = drive(&robot.sessions, &measurement, &[], false, 0)?;
             let noise = TrueNoise::of(&conditions, &instrument_model, mean_square_motion(&plain));
@@ -467,7 +488,7 @@ impl Trial {
     /// The oracle's statistic on a drive with noise of its own, with the effect or without.
     pub(crate) fn statistic(&self, number: u64, hidden: bool) -> Result<f64, ChallengeError> {
         let Self { seed, conditions, robot, instrument_model, .. } = self;
-        let measurement = DriveContext { seed: *seed, number, conditions, robot, instrument_model };
+        let measurement = DriveContext { seed: *seed, number, conditions, robot, instrument_model, instrument: None };
         let all = [&self.hidden];
         let data = drive(&robot.sessions, &measurement, if hidden { &all } else { &[] }, true, 0)?;
         let detectability = Detectability::of(&data, &self.plain, &self.truth, self.noise);

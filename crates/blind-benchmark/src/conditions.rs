@@ -134,8 +134,12 @@ impl Conditions {
     /// Counts of the controllers, which resolve finer, in one tick of the log: as many as bring the
     /// controllers nearest to the speed at which they are tuned.
     pub(crate) fn counts_per_tick(&self) -> u32 {
-        let counts_per_turn = COUNTS_PER_M / self.speed_scale * std::f64::consts::PI * self.wheel_diameter_m;
-        ((counts_per_turn / self.ticks_per_turn).round() as u32).max(1)
+        ((self.counts_per_turn() / self.ticks_per_turn).round() as u32).max(1)
+    }
+
+    /// Counts of the controllers in a turn of a wheel, at the speed at which they are tuned.
+    pub(crate) fn counts_per_turn(&self) -> f64 {
+        COUNTS_PER_M / self.speed_scale * std::f64::consts::PI * self.wheel_diameter_m
     }
 
     /// Way of a wheel between two ticks, metres.

@@ -11,6 +11,7 @@ use motion_programs::Platform;
 use scenario::{Instrument, Scenario};
 use sim_yair::SimulatedRobot;
 
+use super::case_instrument::CaseInstrument;
 use super::conditions::Conditions;
 use super::draw::Draw;
 use super::hidden::{ActingEffect, Hidden};
@@ -34,6 +35,8 @@ pub(crate) struct DriveContext<'c> {
     pub(crate) conditions: &'c Conditions,
     pub(crate) robot: &'c RandomRobot,
     pub(crate) instrument_model: &'c InstrumentModel,
+    /// The instrument that sees all cases, where one does.
+    pub(crate) instrument: Option<CaseInstrument>,
 }
 
 /// The sessions of a robot with hidden effects, with noise or without.
@@ -62,6 +65,9 @@ fn drive_session(
             *rate_hz = case.instrument_model.rate_hz;
         }
     }
+    if let Some(instrument) = case.instrument {
+        instrument.at_work(&mut scenario.instruments, noisy);
+    }
     if !noisy {
         scenario.noise.wheel_sigma_m_per_sqrt_m = 0.0;
     }
@@ -86,6 +92,7 @@ fn drive_session(
         }
     }
     let mut robot = SimulatedRobot::with_more_effects(&scenario, case.seed, case.number, more)?.at_point(point);
+    let states_its_own = case.instrument.is_some_and(CaseInstrument::states_its_own);
     let mut runs = Vec::with_capacity(plan.programs.len());
     for (number, program) in (0_u32..).zip(&plan.programs) {
         let mut run = Run::default();
@@ -93,20 +100,26 @@ fn drive_session(
         // Each run's measurements and rows have draws of their own.
         let address = effects::Address { seed: case.seed, point, trial: case.number, run: number };
         let mut draw = Draw(address.stream(StreamName::new("challenge looks")));
-        case.instrument_model.measurement(&mut run, noisy.then_some(&mut draw));
+        // What an instrument of the scenario errs by is in its readings already.
+        let errs = noisy && !states_its_own;
+        case.instrument_model.measurement(&mut run, errs.then_some(&mut draw));
         if recorded {
             let mut draw = Draw(address.stream(StreamName::new("challenge log")));
             log_model::record(case.conditions, &mut run, &mut draw);
         }
         runs.push(run);
     }
-    Ok(Dataset {
+    let mut dataset = Dataset {
         provenance: Provenance::default(),
         robot: robot.robot(),
-        truth_noise: case.instrument_model.stated(),
+        truth_noise: if states_its_own { robot.truth_noise() } else { case.instrument_model.stated() },
         points: Vec::new(),
         runs,
-    })
+    };
+    if let Some(instrument) = case.instrument.filter(|_| !noisy) {
+        instrument.restate(&mut dataset);
+    }
+    Ok(dataset)
 }
 
 /// Mean squares of speed and yaw rate over some datasets, by their counts and the nominal geometry.

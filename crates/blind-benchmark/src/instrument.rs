@@ -26,6 +26,8 @@ pub enum TruthKind {
     Endpoints,
     /// Displacements between measurements, as scan matching gives them.
     Relative,
+    /// A gyro, tapes, walls or marks, without poses.
+    Partial,
 }
 
 /// What the measurements err by, and what the log loses.
@@ -79,11 +81,37 @@ pub(crate) struct InstrumentModel {
     pub(crate) sigma_theta_rad: f64,
     /// Errors that last: their standard deviation over that of the white ones, and for how long, seconds.
     lasting: (f64, f64),
+    /// Further errors that last, which the simulator makes: of position and of heading two each, by standard
+    /// deviation and for how long, seconds.
+    simulated: Option<[LastingPair; 2]>,
     /// What the dataset states of its noise, over the truth; 0 for nothing.
     stated: f64,
 }
 
+/// Two errors that last, by standard deviation and time, seconds.
+pub(crate) type LastingPair = [(f64, f64); 2];
+
 impl InstrumentModel {
+    /// One with white errors of position, metres, and heading, radians, as it states.
+    pub(crate) fn white(kind: TruthKind, rate_hz: f64, [sigma_xy_m, sigma_theta_rad]: [f64; 2]) -> Self {
+        Self {
+            kind,
+            class: NoiseClass::White,
+            rate_hz,
+            on_rows: false,
+            sigma_xy_m,
+            sigma_theta_rad,
+            lasting: (0.0, 1.0),
+            simulated: None,
+            stated: 1.0,
+        }
+    }
+
+    /// The same with errors of position and of heading that last, which the simulator makes.
+    pub(crate) fn with_lasting(self, simulated: [LastingPair; 2]) -> Self {
+        Self { class: NoiseClass::Correlated, simulated: Some(simulated), ..self }
+    }
+
     pub(crate) fn draw(draws: CaseDraws, conditions: &Conditions) -> Self {
         let mut draw = draws.of("truth kind");
         let kind = match draw.below(10) {
@@ -101,7 +129,7 @@ impl InstrumentModel {
             TruthKind::Dense | TruthKind::Positions => rate.log_uniform(2.0, MAX_RATE_HZ),
             TruthKind::Sparse => rate.log_uniform(0.5, 2.0),
             TruthKind::Relative => rate.log_uniform(1.0, 10.0),
-            TruthKind::Endpoints => RATE_AT_ENDS_HZ,
+            TruthKind::Endpoints | TruthKind::Partial => RATE_AT_ENDS_HZ,
         };
         let can_be_on_rows = kind != TruthKind::Endpoints && !matches!(conditions.stamps, Stamps::Irregular { .. });
         let on_rows = rate.bernoulli(0.5) && can_be_on_rows;
@@ -125,6 +153,7 @@ impl InstrumentModel {
             // Two marks so far apart, metres, or a scan of walls so far away.
             sigma_theta_rad: sigma_xy_m / noise.log_uniform(0.15, 1.5),
             lasting: (noise.uniform(0.5, 2.0), noise.log_uniform(0.3, 3.0)),
+            simulated: None,
             stated,
         }
     }
@@ -142,14 +171,20 @@ impl InstrumentModel {
     /// Variances of position and heading that independent errors of the same weight would have: those of
     /// errors that last grow by (1 + ρ)/(1 − ρ), ρ being the correlation from measurement to measurement.
     pub(crate) fn variances(&self) -> [f64; 2] {
-        let factor = if self.class == NoiseClass::Correlated {
-            let between_s = if self.kind == TruthKind::Endpoints { BETWEEN_ENDS_S } else { 1.0 / self.rate_hz };
-            let rho = (-between_s / self.lasting.1).exp();
-            1.0 + self.lasting.0.powi(2) * (1.0 + rho) / (1.0 - rho)
-        } else {
-            1.0
+        let between_s = if self.kind == TruthKind::Endpoints { BETWEEN_ENDS_S } else { 1.0 / self.rate_hz };
+        let grown = |tau_s: f64| {
+            let rho = (-between_s / tau_s).exp();
+            (1.0 + rho) / (1.0 - rho)
         };
-        [self.sigma_xy_m, self.sigma_theta_rad].map(|sigma| factor * sigma * sigma)
+        let white = [self.sigma_xy_m, self.sigma_theta_rad].map(|sigma| sigma * sigma);
+        if let Some(lasting) = self.simulated {
+            return std::array::from_fn(|k| {
+                white[k] + lasting[k].iter().map(|(sigma, tau_s)| grown(*tau_s) * sigma * sigma).sum::<f64>()
+            });
+        }
+        let (share, tau_s) = self.lasting;
+        let factor = if self.class == NoiseClass::Correlated { 1.0 + share.powi(2) * grown(tau_s) } else { 1.0 };
+        white.map(|variance| factor * variance)
     }
 
     /// Which measurements of a run are taken.

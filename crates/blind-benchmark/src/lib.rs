@@ -11,6 +11,7 @@
 
 mod baseline;
 mod case;
+mod case_instrument;
 mod conditions;
 mod draw;
 mod drive;
@@ -43,6 +44,7 @@ use case::Case;
 
 pub use baseline::{DiagnosisBaseline, DiagnosisCheck, FALSE_ALARM_BUDGET, Guard, Guarded};
 pub use case::CaseKind;
+pub use case_instrument::CaseInstrument;
 pub use error::ChallengeError;
 pub use hidden::EffectKind;
 pub use instrument::{NoiseClass, TruthKind};

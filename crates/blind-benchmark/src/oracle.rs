@@ -255,7 +255,10 @@ impl Detectability {
                 terms.push(variant.term);
             }
         }
-        let free: Vec<usize> = Column::GEOMETRY.iter().map(|column| column.index()).collect();
+        // A gyro's scale is unknown as the geometry is.
+        let has_gyro = datasets.iter().any(|dataset| dataset.truth_noise.gyro.noise_rad_per_sqrt_s.is_some());
+        let columns: Vec<Column> = Column::GEOMETRY.into_iter().chain(has_gyro.then_some(Column::GyroScale)).collect();
+        let free: Vec<usize> = columns.iter().map(|column| column.index()).collect();
         let mut model = Model::of(truth, at - Column::BASE.len());
         let plain = measurement(without, &model, noise, &mut terms)?;
         let mut at_truth = None;
@@ -263,13 +266,16 @@ impl Detectability {
         for _ in 0..GAUSS_NEWTON_STEPS {
             at_truth.get_or_insert(measured.total.chi_square);
             let step = to_best_geometry(&measured.total, &free)?;
-            Column::GEOMETRY.iter().zip(step.iter()).for_each(|(column, by)| model.advance(*column, *by));
+            columns.iter().zip(step.iter()).for_each(|(column, by)| model.advance(*column, *by));
             measured = measurement(datasets, &model, noise, &mut terms)?;
         }
         if measured.z.len() == plain.z.len() {
             measured.total.gradient -= &plain.total.gradient;
             measured.z.iter_mut().zip(&plain.z).for_each(|(measured, plain)| measured.1 -= plain.1);
-            measured.total.chi_square = measured.z.iter().map(|(_, z)| z * z).sum();
+            // Partial measurements have no innovations of their own here: χ² is that of their filter.
+            if !measured.z.is_empty() {
+                measured.total.chi_square = measured.z.iter().map(|(_, z)| z * z).sum();
+            }
         }
         let at_truth = at_truth.unwrap_or(0.0);
         let best = Model { term_values: Vec::new(), ..model };

@@ -12,7 +12,7 @@ use dataset::MapDistortion;
 use kinematics::sin_cos;
 use nalgebra::{DMatrix, DVector};
 
-use crate::normal_equations::Information;
+use crate::normal_equations::{ClusterRobust, Information};
 use crate::records::Records;
 use crate::segment::Start;
 use crate::settings::{GOLDEN_ANGLE_RAD, MAP_WAVES};
@@ -20,7 +20,7 @@ use crate::settings::{GOLDEN_ANGLE_RAD, MAP_WAVES};
 /// What of a covariance is there without the map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum OwnScatter {
-    /// The scatter over runs, which has what the map does to each run for itself.
+    /// The scatter over runs, which has what the map does to runs differently.
     Counted,
     /// The inverse information.
     NotCounted,
@@ -57,42 +57,54 @@ fn waves(distortion: MapDistortion) -> Vec<Wave> {
     all.flat_map(of).filter(|wave| wave.amplitude > 0.0).collect()
 }
 
-/// What the distortion adds to the covariance of parameters. `gradients` gives the normal equation of each
+/// What the distortion adds to the covariance of parameters. `equations` gives the normal equation of each
 /// run with other measured poses, `inverse` is that of the whole information.
 ///
-/// Where the scatter over runs is counted, what the map does to runs in common is added. Errors that cancel
-/// between runs are not taken off: the scatter does not know them well enough.
+/// Where the scatter over runs is counted, what it has of the map already is taken off ([`of_wave`]).
 pub(crate) fn added_covariance(
     records: &Records<'_>,
     distortion: MapDistortion,
     own: OwnScatter,
     inverse: &DMatrix<f64>,
-    mut gradients: impl FnMut(&Records<'_>) -> Vec<Information>,
+    mut equations: impl FnMut(&Records<'_>) -> Vec<Information>,
 ) -> DMatrix<f64> {
     let n = inverse.nrows();
-    let at_rest = gradients(records);
-    let mut scatter = DMatrix::zeros(n, n);
+    let at_rest = equations(records);
+    let mut added = DMatrix::zeros(n, n);
     let mut shifted = records.clone();
     for wave in waves(distortion) {
         shift(&mut shifted, records, &wave);
-        let mut sum = DVector::zeros(n);
-        for (moved, rest) in gradients(&shifted).iter().zip(&at_rest) {
-            let of_run = &moved.gradient - &rest.gradient;
-            if own == OwnScatter::Counted {
-                scatter -= &of_run * of_run.transpose();
-            }
-            sum += of_run;
-        }
-        scatter += &sum * sum.transpose();
+        let runs: Vec<Information> = equations(&shifted)
+            .into_iter()
+            .zip(&at_rest)
+            .map(|(moved, rest)| Information { gradient: moved.gradient - &rest.gradient, ..rest.clone() })
+            .collect();
+        added += of_wave(&runs, own, inverse);
     }
     let size = inverse.diagonal().map(|variance| variance.max(f64::MIN_POSITIVE).sqrt());
-    let added = inverse * scatter * inverse;
     // Over the standard deviations: metres, radians and ratios differ by orders of magnitude.
     let scaled = DMatrix::from_fn(n, n, |i, j| added[(i, j)] / (size[i] * size[j]));
     let mut eigen = scaled.symmetric_eigen();
     eigen.eigenvalues.apply(|value| *value = value.max(0.0));
     let positive = eigen.recompose();
     DMatrix::from_fn(n, n, |i, j| positive[(i, j)] * size[i] * size[j])
+}
+
+/// What one wave adds, by the shift g of each run's gradient.
+///
+/// The estimate moves by I⁻¹ Σ g. The scatter over runs is taken after the fit has moved: it sees what is
+/// left of each run's shift, g − I_r I⁻¹ Σ g, and nothing of a shift that all runs have in common.
+fn of_wave(runs: &[Information], own: OwnScatter, inverse: &DMatrix<f64>) -> DMatrix<f64> {
+    let sum = runs.iter().fold(DVector::zeros(inverse.nrows()), |sum, run| sum + &run.gradient);
+    let moved = inverse * sum;
+    let whole = &moved * moved.transpose();
+    if own == OwnScatter::NotCounted {
+        return whole;
+    }
+    let left = runs
+        .iter()
+        .map(|run| Information { gradient: &run.gradient - &run.matrix * &moved, matrix: run.matrix.clone() });
+    whole - ClusterRobust::of(inverse, left).covariance
 }
 
 /// Shifts every measured pose by a wave; displacements are in no map.
@@ -116,6 +128,23 @@ fn shift(shifted: &mut Records<'_>, records: &Records<'_>, wave: &Wave) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_all_runs_share_is_added_whole_and_what_they_differ_by_is_in_their_scatter() {
+        // One parameter, four runs of unit information: the estimate is the mean of the runs' shifts.
+        let of = |gradients: [f64; 4], own| {
+            let runs = gradients.map(|gradient| Information {
+                matrix: DMatrix::from_element(1, 1, 1.0),
+                gradient: DVector::from_element(1, gradient),
+            });
+            of_wave(&runs, own, &DMatrix::from_element(1, 1, 0.25))[(0, 0)]
+        };
+        // A shift of all runs by 1 moves the estimate by 1, and no run from the others.
+        assert!((of([1.0; 4], OwnScatter::Counted) - 1.0).abs() < 1e-15);
+        // What runs differ by cancels in the mean and is in their scatter: the sample variance 4/3 over four.
+        assert!((of([1.0, -1.0, 1.0, -1.0], OwnScatter::Counted) + 1.0 / 3.0).abs() < 1e-15);
+        assert!(of([1.0, -1.0, 1.0, -1.0], OwnScatter::NotCounted).abs() < 1e-15);
+    }
 
     #[test]
     fn waves_make_the_stated_covariance_at_every_distance_within_two_lengths() {

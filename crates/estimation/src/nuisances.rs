@@ -6,7 +6,7 @@ use nalgebra::DVector;
 
 use crate::error::EstimationError;
 use crate::model::{Column, GroupExtrinsics, Grouping, Instrument};
-use crate::model_fit::ModelFit;
+use crate::model_fit::{ModelFit, unobservable};
 use crate::normal_equations::{NormalEquations, total};
 use crate::optimizer::Solution;
 use crate::pass_options::OutlierGate;
@@ -108,6 +108,7 @@ pub(crate) fn add_nuisances(fit: &mut ModelFit<'_>, gate: OutlierGate) -> Result
         }
     }
     if let Some(AcceptedNuisances { columns, own, .. }) = best {
+        let before = fit.clone();
         let mut from = fit.current_values();
         // The refit starts at the step that all measurements ask for: from zero, the gate could reject what
         // it explains.
@@ -126,8 +127,20 @@ pub(crate) fn add_nuisances(fit: &mut ModelFit<'_>, gate: OutlierGate) -> Result
         }
         fit.columns = columns;
         fit.refit(Some(from), &mut [])?;
+        // Nuisances that hide the geometry explain it away: a latency that has left the run, at which nothing
+        // that was measured meets a motion.
+        if hidden_directions(fit) > hidden_directions(&before) {
+            *fit = before;
+        }
     }
     Ok(())
+}
+
+/// How many directions of the geometry the measurements of a fit do not determine.
+fn hidden_directions(fit: &ModelFit<'_>) -> usize {
+    fit.solution
+        .information(&fit.columns)
+        .map_or(Column::GEOMETRY.len(), |information| unobservable(&information.matrix).len())
 }
 
 /// Autocorrelated innovations and outliers may be due to wrong extrinsics or latency. Fits these without
