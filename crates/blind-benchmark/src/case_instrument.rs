@@ -218,7 +218,7 @@ impl CaseInstrument {
                 }
                 Instrument::Tape { sigma_m } => *sigma_m *= NOISE_FREE,
                 Instrument::Wall(wall) => {
-                    (wall.sigma_m, wall.sigma_rad) = (WALL_SIGMA_M * NOISE_FREE, WALL_SIGMA_RAD * NOISE_FREE)
+                    (wall.sigma_m, wall.sigma_rad) = (WALL_SIGMA_M * NOISE_FREE, WALL_SIGMA_RAD * NOISE_FREE);
                 }
                 Instrument::Revisit { sigma_xy_m, sigma_theta_rad } => {
                     *sigma_xy_m *= NOISE_FREE;
@@ -280,7 +280,9 @@ mod tests {
     #[test]
     fn each_instrument_measures_what_determines_the_drive() {
         for (name, instrument) in CaseInstrument::NAMED {
-            let case = Case::draw(Scope::Instrument(instrument), 5, 0).expect("simulates").ok().expect("a null");
+            let Ok(case) = Case::draw(Scope::Instrument(instrument), 5, 0).expect("simulates") else {
+                panic!("no null")
+            };
             let runs = || case.datasets.iter().flat_map(|dataset| &dataset.runs);
             let poses = runs().map(|run| run.truth.len()).sum::<usize>();
             assert_eq!(poses > 0, instrument.has_poses(), "{name}");
