@@ -488,7 +488,7 @@ mod tests {
     #[test]
     fn a_file_of_the_limit_is_read_and_a_longer_one_refused() {
         let path = std::env::temp_dir().join(format!("yair-calibration-{}.toml", std::process::id()));
-        let text = format!("{:x<1$}", "methods = []\n#", MAX_FILE_BYTES as usize);
+        let text = "methods = []\n#".to_owned() + &"x".repeat(MAX_FILE_BYTES as usize - 14);
         std::fs::write(&path, &text).expect("written");
         let of_the_limit = CalibrationReport::read(&path);
         std::fs::write(&path, text + "x").expect("written");

@@ -81,8 +81,8 @@ fn rows_by_time(file: &Connection, most: u64, lose: &mut impl FnMut(String)) -> 
     Ok(found)
 }
 
-/// What only looks like a table of a bag: a view, a virtual table or a computed column may make rows and bytes
-/// without end. Names differ by no case in SQLite.
+/// What only looks like a table of a bag: a view, a virtual table or a computed column may make rows and
+/// bytes without end. Names differ by no case in SQLite.
 fn computed_table(file: &Connection) -> rusqlite::Result<Option<String>> {
     file.pragma_update(None, "trusted_schema", false)?;
     file.pragma_update(None, "cell_size_check", true)?;
