@@ -132,8 +132,7 @@ impl Case {
         let (case_kind, index) = CaseKind::in_scope(scope, number);
         let mut unresolved_robots = 0;
         for attempt in 0..ATTEMPTS {
-            // Two that show on the same paths must be met, and one that the instrument can see; which, is drawn
-            // anew.
+            // Two that show on the same paths, or one that the instrument can see, are drawn anew until met.
             let is_drawn_anew = case_kind == CaseKind::Pair || scope.instrument().is_some();
             let ids = Self::ids(seed, number, case_kind, index, if is_drawn_anew { attempt } else { 0 });
             match Self::attempt(CaseDraws { seed, case: number, attempt }, case_kind, scope.instrument(), &ids)? {
