@@ -17,7 +17,7 @@ use crate::model_comparison::{log_bayes_factor, margin_over_units, odds_within};
 use crate::record_faults::sessions;
 use crate::residual_tests::{Checked, check};
 use crate::selection::{SearchResult, search, search_ungated};
-use crate::settings::levels::{SCAN_LEVEL, SPARSE_TERM_LEVEL};
+use crate::settings::levels::{MIN_LOG_ODDS_MARGIN, SCAN_LEVEL, SPARSE_TERM_LEVEL};
 use crate::settings::search::{AUTOCORRELATION_SIGMAS, MIN_AUTOCORRELATION, SCAN_LEVEL_IF_DEPENDENT};
 use crate::sparse_terms::{SparseSearch, UncataloguedTerms, sparse};
 
@@ -148,7 +148,7 @@ fn compare_with_sparse<'a>(base: &ModelFit<'a>, model: MeanModel<'a>) -> MeanMod
     let more = unnamed + finding::uncatalogued_log_odds() - named;
     let margin = margin_over_units(named, likeliest, &model.found.model);
     let Some(term) = finding.filter(|_| more > margin) else {
-        let competing = Some(odds_within(more, margin).min(1.0)).filter(|_| more > -margin);
+        let competing = Some(odds_within(more, margin).min(1.0)).filter(|_| more > -MIN_LOG_ODDS_MARGIN);
         return MeanModel { competing, ..model };
     };
     let instead = UncataloguedTerms::from(base, term);
