@@ -299,7 +299,7 @@ mod tests {
                 CaseInstrument::Revisit => [12, 16],
                 CaseInstrument::Wall => [0, 0],
             };
-            // The sides of squares are between standstills without a tape: the robot does not stop to be read.
+            // Sides of squares are not taped: the robot does not stop to be read.
             assert_eq!([tapes, marks], expected, "{name}");
             assert_eq!(gyros > 0, instrument == CaseInstrument::GyroTape, "{name}");
             assert_eq!(walls > 0, instrument == CaseInstrument::Wall, "{name}");
