@@ -69,8 +69,8 @@ fn processor_s() -> Option<f64> {
     Some(0.01 * ticks as f64)
 }
 
-/// One execution in a folder, which is emptied after it. Its time is the processor's, where the system tells: a
-/// campaign runs beside other work.
+/// One execution in a folder, which is emptied after it. Its time is the processor's, where the system
+/// tells: a campaign runs beside other work.
 fn execute(target: &Target, corpus: &[corpus::Sample], number: u64, folder: &Path) -> Ended {
     let mut random = generator(target, number);
     let before = MEMORY.current_usage();

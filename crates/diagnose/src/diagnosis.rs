@@ -286,8 +286,8 @@ pub(crate) fn session_names(datasets: &[Dataset]) -> Vec<String> {
 }
 
 /// The base fit, of thinned measurements where odometry seems uncorrelated with all of them: between frequent
-/// measurements the robot moves less than their lasting errors, or wrong stamps, move them. A few that are left
-/// and determine no wheel do not say that it is correlated.
+/// measurements the robot moves less than their lasting errors, or wrong stamps, move them. A few that are
+/// left and determine no wheel do not say that it is correlated.
 fn correlated_base<'a>(records: &'a [Dataset], base: ModelFit<'a>) -> ModelFit<'a> {
     if is_correlated(&base, &[]) {
         return base;

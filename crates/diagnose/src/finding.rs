@@ -198,8 +198,8 @@ pub(crate) fn of_failed_checks(checked: &Checked, without: &[String]) -> Option<
     let worst = least(&mut checked.checks.iter().filter(|test| test.shows_dependence()))
         .or_else(|| least(&mut checked.checks.iter().filter(|test| !test.passes)));
     let worst = worst.filter(|_| !failed.is_empty())?;
-    // Residuals that are correlated with the ones before them, and with nothing that was recorded, may be errors of
-    // the instrument that last.
+    // Residuals that are correlated with the ones before them, and with nothing that was recorded, may be
+    // errors of the instrument that last.
     let only_correlated = failed.iter().all(|check| matches!(check, Check::Whiteness(_)));
     let sign = only_correlated.then_some(Sign::AutocorrelatedErrors);
     let errors = sign.into_iter().flat_map(|sign| with_sign(sign, without)).map(Cause::Effect);

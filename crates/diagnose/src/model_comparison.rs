@@ -14,9 +14,9 @@ pub(crate) fn log_odds_margin(best: f64) -> f64 {
     MIN_LOG_ODDS_MARGIN.max(MODEL_MISMATCH_FRACTION * best)
 }
 
-/// The same of two models whose log likelihoods differ from unit to unit, runs or blocks where these are few: their
-/// sum over n units with the standard deviation s scatters by √n s (Vehtari & Lampinen 2002), and a few units that
-/// one of them suits decide nothing.
+/// The same of two models whose log likelihoods differ from unit to unit, runs or blocks where these are
+/// few: their sum over n units with the standard deviation s scatters by √n s (Vehtari & Lampinen 2002),
+/// and a few units that one of them suits decide nothing.
 pub(crate) fn margin_over_units(best: f64, one: &AugmentedModel<'_>, other: &AugmentedModel<'_>) -> f64 {
     let costs = |model: &AugmentedModel<'_>| -> Vec<((usize, usize), f64)> {
         let units = model.fit.units(&mut terms(&model.candidates));

@@ -202,8 +202,8 @@ fn is_drive(fit: &ModelFit<'_>) -> bool {
         && fit.solution.converged
 }
 
-/// Are the wheels those of the stated robot, and are they not in another fit, or is far less left of the noise that
-/// it needs? What was lost beside a fault is noise still.
+/// Are the wheels those of the stated robot, and are they not in another fit, or is far less left of the
+/// noise that it needs? What was lost beside a fault is noise still.
 fn is_far_more_of_a_drive(fit: &ModelFit<'_>, than: &ModelFit<'_>) -> bool {
     let wheel_sigma = |fit: &ModelFit<'_>| fit.solution.noise.sigma(NoiseComponent::Wheel);
     has_stated_geometry(fit)

@@ -207,8 +207,8 @@ impl ModelFit<'_> {
         }
     }
 
-    /// The normal equation in units that can be held out: runs, or blocks where runs are few. `terms` are those
-    /// of the fit.
+    /// The normal equation in units that can be held out: runs, or blocks where runs are few. `terms` are
+    /// those of the fit.
     #[must_use]
     pub fn units(&self, terms: &mut [Box<dyn ModelTerm>]) -> Vec<NormalEquations> {
         if self.solution.pass.runs.len() >= MIN_RUNS_TO_HOLD_OUT {

@@ -212,7 +212,9 @@ impl<'a> WheelAngleInterpolator<'a> {
     /// whichever says less, and not at all where they disagree, as at a jump of the speed (van Leer 1979).
     /// 0 where single rows do not say their rates, and in rows so long that a robot does several things.
     fn acceleration_rad_s2(&self, row: usize) -> Wheels<f64> {
-        let Some([before, after]) = self.accelerations_around(row).filter(|_| self.is_steady_around(row)) else {
+        let Some([before, after]) =
+            self.accelerations_around(row).filter(|_| self.rates.are_joined_around(self.t_s, row))
+        else {
             return Wheels::both(0.0);
         };
         before.zip_with(
@@ -221,11 +223,6 @@ impl<'a> WheelAngleInterpolator<'a> {
                 if before * after > 0.0 { before.signum() * before.abs().min(after.abs()) } else { 0.0 }
             },
         )
-    }
-
-    /// Whether a row and both of its neighbours are short, without a gap between them.
-    fn is_steady_around(&self, row: usize) -> bool {
-        (row - 1..=row + 1).all(|row| self.rates.are_joined(self.t_s, row))
     }
 
     /// How the wheels speed up from the row before to a row, and from it to the next, rad/s²; `None` where
@@ -242,11 +239,11 @@ impl<'a> WheelAngleInterpolator<'a> {
         Some([by(row - 1, row), by(row, row + 1)])
     }
 
-    /// Variances of the wheels' turns at an instant of a row's interval, rad²: an acceleration that is off by
-    /// what it changes by from row to row, or by what it changes by in the rows around where that is more, as
-    /// what pushes the shafts goes on. A smooth one is off by half of that; one that changes faster than rows
-    /// come, by more than they show. In a row that is not taken to speed up, all of its acceleration is off. A
-    /// wheel that did not turn from row to row stood in between.
+    /// Variances of the wheels' turns at an instant of a row's interval, rad²: an acceleration that is off
+    /// by what it changes by from row to row, or by what it changes by in the rows around where that is
+    /// more, as what pushes the shafts goes on. A smooth one is off by half of that; one that changes
+    /// faster than rows come, by more than they show. In a row that is not taken to speed up, all of its
+    /// acceleration is off. A wheel that did not turn from row to row stood in between.
     fn interpolated_rad2(&self, row: usize, t_s: f64) -> Wheels<f64> {
         let since_s = t_s - self.t_s[row];
         let left_s = self.t_s.get(row + 1).map_or(0.0, |next_s| next_s - t_s);
@@ -255,7 +252,7 @@ impl<'a> WheelAngleInterpolator<'a> {
         }
         let off_by = |row: usize| {
             let [before, after] = self.accelerations_around(row)?;
-            let is_taken = self.is_steady_around(row);
+            let is_taken = self.rates.are_joined_around(self.t_s, row);
             Some(before.zip_with(after, |before, after| {
                 let change = (after - before).powi(2);
                 if is_taken { change } else { change.max(before * before).max(after * after) }
@@ -451,18 +448,10 @@ mod tests {
         dataset.runs[0].odometry.t_s = t_s;
         let session = dataset.session();
         let track = WheelAngleInterpolator::of(&session.runs[0], session.robot).expect("a track");
-        let turned = track.cursor().angle_rad(0.8).expect("spanned").left;
-        let sigma = track.interpolated_rad2(3, 0.8).left.sqrt();
-        // ½ · 20 · 0.2 · 0.2, on either side of the middle. Rejects what an acceleration changes by from row to row,
-        // which is nothing.
-        assert!((turned - 6.4 - 0.4).abs() < 1e-12 && (sigma - 0.4).abs() < 1e-9, "{turned} {sigma}");
-        // A short row follows it.
-        let (turned, sigma) =
-            (track.cursor().angle_rad(0.3).expect("spanned").left, track.interpolated_rad2(1, 0.3).left.sqrt());
-        assert!((turned - 0.9).abs() < 1e-12, "{turned}");
-        // It counts with the rows around, of which the long one and its neighbours are not taken to speed up: the half
-        // of 0.1² and the root of 3 · 20²/5.
-        assert!((sigma - 0.005 * 20.0 * f64::sqrt(0.6)).abs() < 1e-9, "{sigma}");
+        let (turned, variance) = (track.cursor().angle_rad(0.8), track.interpolated_rad2(3, 0.8));
+        // ½ · 20 · 0.2 · 0.2. Rejects what the acceleration changes by from row to row, which is nothing.
+        let off = turned.expect("spanned").left - 6.4;
+        assert!((off - 0.4).abs() < 1e-12 && (variance.left - 0.16).abs() < 1e-9, "{off} {variance:?}");
     }
 
     #[test]

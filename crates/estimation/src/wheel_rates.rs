@@ -114,6 +114,11 @@ impl WheelRates {
         is_short && self.starts.binary_search(&(row + 1)).is_err()
     }
 
+    /// The same of a row that is not the first and of both of its neighbours.
+    pub(crate) fn are_joined_around(&self, t_s: &[f64], row: usize) -> bool {
+        (row - 1..=row + 1).all(|row| self.are_joined(t_s, row))
+    }
+
     /// Rates at a row.
     pub(crate) fn at_row(&self, row: usize) -> Wheels<f64> {
         Wheels { left: self.at_rows_rad_s.left[row], right: self.at_rows_rad_s.right[row] }

@@ -22,7 +22,8 @@ pub(crate) const OUTLIER_PROBABILITY: f64 = 1e-5;
 /// Tuned: by hand; no record of what on.
 pub(crate) const AFTER_OUTLIER_LEVEL: f64 = 0.01;
 
-/// Fraction of a measurement's variance. Where the motion within rows has more, neither size nor tails are tested.
+/// Fraction of a measurement's variance. Where the motion within rows has more, neither size nor tails are
+/// tested.
 /// Derived: what has a tenth of a variance has a hundredth of its kurtosis.
 pub(crate) const MAX_WITHIN_ROW_SHARE: f64 = 0.1;
 

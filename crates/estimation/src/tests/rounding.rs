@@ -75,7 +75,8 @@ fn the_gradient_of_rounded_counts_is_that_of_the_cost() {
 
 /// Where a robot is by its counts, the variance of that, and its derivative by a parameter that moves it by
 /// as much, once it was measured twice within a row with an error of 1: each time after going on so far.
-/// Everything is along the robot: P = R = 1, Q = 1 of rounding, or of motion within the row at these instants.
+/// Everything is along the robot: P = R = 1, Q = 1 of rounding, or of motion within the row at these
+/// instants.
 fn measured_twice(moved_and_measured: [(f64, f64); 2], within_row: Option<[f64; 2]>) -> [f64; 3] {
     use crate::covariances::{Covariance, Covariances};
     use crate::derivatives::Derivatives;
@@ -154,12 +155,13 @@ fn a_rows_error_goes_along_with_the_robot() {
     assert!((x_m - (5.0 + 2.0 / 2.5)).abs() < 1e-6 && (variance - 0.6).abs() < 1e-6, "{x_m} {variance}");
 }
 
-/// What nobody recorded of the motion within a row is nothing at its end. By hand: the first measurement, of Q + R
-/// = 2, leaves P = 2/3 and the counts at 2/3; the second, at the row's end, is of R = 1 alone.
+/// What nobody recorded of the motion within a row is nothing at its end. By hand: the first measurement,
+/// of Q + R = 2, leaves P = 2/3 and the counts at 2/3; the second, at the row's end, is of R = 1 alone.
 #[test]
 fn the_motion_within_a_row_is_no_error_at_its_end() {
     let [x_m, variance, _] = measured_twice([(0.0, 2.0), (0.0, 4.0)], Some([1.0, 0.0]));
-    // Rejects an error that the robot takes along to the row's end, as it does with the rounding of counts: 0.6.
+    // Rejects an error that the robot takes along to the row's end, as it does with the rounding of counts:
+    // 0.6.
     assert!((variance - 0.4).abs() < 1e-12, "{variance}");
     assert!((x_m - (2.0 / 3.0 + 0.4 * (4.0 - 2.0 / 3.0))).abs() < 1e-12, "{x_m}");
 }
