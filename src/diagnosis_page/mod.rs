@@ -117,8 +117,9 @@ impl Page<'_> {
         let of = if self.document.gain.is_some() { "extended" } else { "calibrated" };
         writeln!(
             page,
-            "Residuals of the {of} model; {failed} of {} checks fail, together at 1 % (Holm).\n",
-            checks.len()
+            "Residuals of the {of} model; {failed} of {} checks fail, together at {} % (Holm).\n",
+            checks.len(),
+            100.0 * diagnose::CHECKS_LEVEL
         )?;
         writeln!(page, "| question | answer | statistic | p-value |\n| --- | --- | --- | --- |")?;
         for check in checks {

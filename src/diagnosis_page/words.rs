@@ -5,11 +5,16 @@ use effects::{Estimate, Estimates};
 
 /// What a finding's first name means, with its sizes; the finding's own sentence where that says more.
 pub(crate) fn meaning(finding: &Finding) -> String {
+    meaning_of_first(finding).unwrap_or_else(|| finding.sentence.clone())
+}
+
+/// What a finding's first name means, with its sizes, where the catalogue says it.
+fn meaning_of_first(finding: &Finding) -> Option<String> {
     let estimate = |value: &Value| Estimate { value: value.value, sigma: value.sigma };
     let sizes: Estimates<'_> =
         finding.parameters.iter().map(|(name, value)| (name.as_str(), estimate(value))).collect();
     let description = effects::description(&finding.id);
-    description.and_then(|of| of.with_values(&sizes)).unwrap_or_else(|| finding.sentence.clone())
+    description.and_then(|of| of.with_values(&sizes))
 }
 
 /// The verdict in a sentence.
@@ -21,11 +26,12 @@ pub(crate) fn verdict(document: &Document) -> String {
     let found: Vec<String> = document
         .findings
         .iter()
-        .map(|finding| match &finding.names[..] {
-            [_, others @ ..] if !others.is_empty() => {
-                format!("{} – or it is {}, which these data do not discriminate", meaning(finding), named(others))
+        .map(|finding| match (meaning_of_first(finding), &finding.names[..]) {
+            (Some(first), [_, others @ ..]) if !others.is_empty() => {
+                format!("{first} – or it is {}, which these data do not discriminate", named(others))
             }
-            _ => meaning(finding),
+            // A sentence names all causes itself.
+            (first, _) => first.unwrap_or_else(|| finding.sentence.clone()),
         })
         .collect();
     format!("{}.{}", capitalised(&found.join("; ")), gain(document).map_or(String::new(), |gain| format!(" {gain}")))

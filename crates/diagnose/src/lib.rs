@@ -70,4 +70,5 @@ pub use nested_gain::nested_gains;
 pub use plan::{HANDLING_S, Limits, MINUTES, PlanError, ScenarioPlan, moved_over_m, plan_scenario};
 pub use residuals::{Bin, Component, Profile, Residuals, ResidualsByCovariate};
 pub use rivals::Refusal;
+pub use settings::levels::CHECKS_LEVEL;
 pub use stage::{OnStage, Stage};

@@ -2,7 +2,7 @@
 
 /// Probability. Family-wise false-positive rate of all residual tests.
 /// Budgeted: a fifth of the 5 % of false positives of a diagnosis.
-pub(crate) const CHECKS_LEVEL: f64 = 0.005;
+pub const CHECKS_LEVEL: f64 = 0.005;
 
 /// Probability. Family-wise false-positive rate of the search for a sparse term.
 /// Budgeted: a tenth of the 5 % of false positives of a diagnosis.
