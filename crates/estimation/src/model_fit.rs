@@ -378,7 +378,10 @@ impl ModelFit<'_> {
         own: OwnScatter,
         terms: &mut [Box<dyn ModelTerm>],
     ) -> DMatrix<f64> {
-        let Some(map) = self.records.map else { return DMatrix::zeros(inverse.nrows(), inverse.ncols()) };
+        // Where nothing is determined, there is nothing to add to.
+        let Some(map) = self.records.map.filter(|_| !inverse.is_empty()) else {
+            return DMatrix::zeros(inverse.nrows(), inverse.ncols());
+        };
         let Solution { model, noise, free_headings, .. } = &self.solution;
         // The counts are integrated once: they are the same wherever the poses are.
         let mut kept = None;
