@@ -235,6 +235,15 @@ const hyphenated = () => {
   return found;
 };
 
+let last = Promise.resolve();
+
+/** What `work` returns, which begins when all work before it is done: for what the pages share. */
+const alone = (work) => {
+  const result = last.then(work);
+  last = result.catch(() => {});
+  return result;
+};
+
 /** Hands on the page: the wheel, two fingers, the button that copies. */
 async function handle(browser, name, wanted) {
   if (!wanted.runs || wanted.hostile) return;
@@ -259,13 +268,15 @@ async function handle(browser, name, wanted) {
   await page.keyboard.press("0");
   check(name, "0 shows all again", (await sum()) === whole);
   if (await page.$("button.copy")) {
-    // Where files get no clipboard the page selects the text instead, and says so.
+    // Where files get no clipboard the page selects the text instead, and says so. The browser has one clipboard for all pages.
     await context.grantPermissions(["clipboard-read", "clipboard-write"]).catch(() => {});
     const expected = await page.$eval(".code code", (code) => code.textContent);
-    await page.click("button.copy");
-    await page.waitForFunction(() => document.querySelector("button.copy").textContent !== "Copy");
-    const said = await page.textContent("button.copy");
-    const copied = await page.evaluate(() => navigator.clipboard.readText().catch(() => getSelection().toString()));
+    const { said, copied } = await alone(async () => {
+      await page.click("button.copy");
+      await page.waitForFunction(() => document.querySelector("button.copy").textContent !== "Copy");
+      const said = await page.textContent("button.copy");
+      return { said, copied: await page.evaluate(() => navigator.clipboard.readText().catch(() => getSelection().toString())) };
+    });
     check(name, "the button copies the text", copied.trim() === expected.trim() && /Copied|Selected/.test(said), `${said}: ${copied}`);
   }
   await context.close();
