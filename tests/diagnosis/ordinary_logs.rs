@@ -49,8 +49,8 @@ const KINDS: &[(&str, Change, &[&str])] = &[
     ("120 ticks a turn", |of| of.ticks_per_rev = 120.0, &[]),
     ("500 ticks, speed ripple", |of| (of.ticks_per_rev, of.ripple) = (500.0, 0.03), &[]),
     ("jitter of 2 ms", |of| of.stamps = Stamps::Jitter(2e-3), &["interval_error"]),
-    // Stamps late by 5 ms on average are a clock that is ahead of the instrument's.
-    ("received 5 ms late", |of| of.stamps = Stamps::Received(5e-3), &["interval_error", "truth_latency"]),
+    // That stamps are late by 5 ms on average is theirs, not the instrument's.
+    ("received 5 ms late", |of| of.stamps = Stamps::Received(5e-3), &["interval_error"]),
     ("counts at 10 Hz", |of| of.odometry_hz = 10.0, &[]),
     ("counts at 20 Hz", |of| of.odometry_hz = 20.0, &[]),
     (
@@ -62,6 +62,19 @@ const KINDS: &[(&str, Change, &[&str])] = &[
         &["interval_error"],
     ),
     ("20 Hz, truth between rows", |of| (of.odometry_hz, of.truth_between_rows) = (20.0, 0.5), &[]),
+    (
+        "counts at 10 Hz, truth of 0.3 mm at 20 Hz",
+        |of| (of.odometry_hz, of.truth_sigma_m, of.truth_sigma_rad, of.truth_hz) = (10.0, 3e-4, 5e-4, 20.0),
+        &[],
+    ),
+    (
+        "500 ticks at 10 Hz, truth of 0.3 mm at 20 Hz",
+        |of| {
+            (of.ticks_per_rev, of.odometry_hz) = (500.0, 10.0);
+            (of.truth_sigma_m, of.truth_sigma_rad, of.truth_hz) = (3e-4, 5e-4, 20.0);
+        },
+        &[],
+    ),
     ("ends of runs", |of| of.reports = Reports::FirstAndLast, &[]),
     ("positions", |of| of.reports = Reports::Positions, &[]),
     ("truth at 50 Hz", |of| of.truth_hz = 50.0, &[]),

@@ -214,6 +214,7 @@ fn stages(datasets: &[Dataset], options: &Options, min_common_clock_s: f64) -> R
     let carry_over: Vec<CarryOver> =
         (0..model.candidates.len()).map(|candidate| carry_over(model, candidate, &names)).collect();
     let findings = findings(&StageResults {
+        recorded,
         structure: &structure,
         log: log.as_ref(),
         spans: spans.as_ref(),
@@ -308,9 +309,9 @@ fn gain_of(base: &ModelFit<'_>, model: &AugmentedModel<'_>, names: &[String]) ->
 
 /// The model without the terms that other sessions and paths are not known to have.
 fn carried<'a>(base: &ModelFit<'a>, model: &AugmentedModel<'a>, findings: &[Finding]) -> AugmentedModel<'a> {
-    with_candidates(base, model, |index, _| {
+    with_candidates(base, model, |index, candidate| {
         let of_term = findings.iter().find(|finding| finding.term == Some(index));
-        of_term.is_none_or(Finding::is_in_extended_model)
+        of_term.map_or(candidate.is_of_instrument(), Finding::is_in_extended_model)
     })
 }
 

@@ -62,6 +62,11 @@ impl Finding {
         self.first().is_unlisted()
     }
 
+    /// Whether its most probable cause is an error of the log's stamps.
+    pub(crate) fn is_of_stamps(&self) -> bool {
+        effects::description(self.first().id()).is_some_and(|description| description.restamped.is_some())
+    }
+
     /// Whether an uncatalogued cause is among the candidates.
     pub(crate) fn has_unlisted(&self) -> bool {
         self.causes.iter().any(Cause::is_unlisted)

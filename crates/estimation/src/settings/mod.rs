@@ -166,6 +166,10 @@ pub(crate) const ROWS_OF_CHANGE: usize = 5;
 /// Budgeted: it changes a standard deviation by 0.05 %.
 pub(crate) const MIN_ROUNDING_VARIANCE_RATIO: f64 = 1e-3;
 
+/// Variance that poses of one row have in common, over that of the instrument, up to which all are taken.
+/// Budgeted: the mean of many then varies by a few tenths more than is said, in the worst case.
+pub(crate) const MAX_SHARED_VARIANCE_RATIO: f64 = 0.1;
+
 /// Farthest extrapolation beyond a log's first or last row, as a share of the interval there.
 /// Derived: beyond half an interval another row would have been written.
 pub(crate) const MAX_EXTRAPOLATION: f64 = 0.5;
