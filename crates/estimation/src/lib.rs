@@ -24,6 +24,7 @@ mod filter;
 mod filter_state;
 mod group_extrinsics;
 mod kinematic_samples;
+mod layout;
 mod log_dead_reckoning;
 mod map_distortion;
 mod maximum_likelihood;
