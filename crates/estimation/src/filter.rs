@@ -12,6 +12,7 @@ use nalgebra::{Matrix3, Vector3, Vector4};
 use crate::covariances::{Covariance, Covariances};
 use crate::derivatives::Derivatives;
 use crate::filter_state::{FilterState, Step, Update};
+use crate::innovation::InnovationComponent;
 use crate::kinematic_samples::KinematicSample;
 use crate::layout::Layout;
 use crate::model::{Column, Instrument, Model};
@@ -25,21 +26,6 @@ use crate::rounding::Rounding;
 use crate::segment::{MeasuredPose, Segment, Start};
 use crate::settings::{OUTLIER_CHI_SQUARE, RESTART_AFTER_OUTLIERS};
 use crate::thinning::PropagationInterval;
-
-/// One whitened component of a measurement's innovation.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct InnovationComponent {
-    /// Which segment.
-    pub segment: usize,
-    /// Which measurement of the segment.
-    pub measurement: usize,
-    /// 0 along the robot, 1 across, 2 heading.
-    pub component: usize,
-    /// Over its standard deviation.
-    pub z: f64,
-    /// That standard deviation: metres, or radians of a heading.
-    pub sigma: f64,
-}
 
 /// The filter of one segment.
 pub(super) struct Filter<'f, 'a> {
@@ -273,7 +259,7 @@ impl<'f, 'a> Filter<'f, 'a> {
             self.by.set(Column::SensorTheta.index(), Vector3::new(-mounted.y, mounted.x, -1.0));
             self.by.set(Column::Latency.index(), by_latency);
         }
-        self.measurement(propagations, t_s, twist);
+        self.measurement(propagations, (t_s, twist), sin_cos(self.pose.theta_rad));
         // What went before the start is not since the measurement before the next one.
         let _ = self.propagator.sample(self.pose, (self.number, 0));
         for (number, size) in self.model.term_values.iter().enumerate() {
@@ -316,11 +302,10 @@ impl<'f, 'a> Filter<'f, 'a> {
     }
 
     /// Finds what the terms add to the measurement after so many propagation intervals at the pose in force,
-    /// in the room, for each parameter.
+    /// in the room, for each parameter; the pose has a heading of this sine and cosine.
     #[inline(always)]
-    fn measurement(&mut self, propagations: usize, t_s: f64, twist: Twist) {
+    fn measurement(&mut self, propagations: usize, (t_s, twist): (f64, Twist), (sin, cos): (f64, f64)) {
         self.propagator.measurement(self.pose, propagations, t_s, twist);
-        let (sin, cos) = sin_cos(self.pose.theta_rad);
         let by_measurement =
             self.by_measurement.x.iter_mut().zip(&mut self.by_measurement.y).zip(&mut self.by_measurement.theta);
         for (((x, y), theta), gradient) in by_measurement.zip(&self.propagator.gradients) {
@@ -366,14 +351,14 @@ impl<'f, 'a> Filter<'f, 'a> {
         let Some(interval) = self.segment.intervals[propagation.intervals.clone()].last().copied() else { return true };
         let variance = self.variance_of(&measured);
         let model = self.model;
+        let (sin, cos) = sin_cos(self.pose.theta_rad);
         let (rounding, mut state) = self.rounded();
-        rounding.enter(&mut state, variance, interval.interpolated_rad2[1], model);
+        rounding.enter(&mut state, variance, interval.interpolated_rad2[1], (model, (sin, cos)));
         let twist = self.propagator.twist(interval.rate_at_ends_rad_s[1]);
-        self.measurement(number + 1, measured.t_s, twist);
+        self.measurement(number + 1, (measured.t_s, twist), (sin, cos));
         let sample = self.propagator.sample(self.pose, (self.number, propagation.measurement));
         let Instrument { body_from_sensor: Pose { x_m: lx, y_m: ly, theta_rad: ltheta }, latency_s: late } =
             self.instrument;
-        let (sin, cos) = sin_cos(self.pose.theta_rad);
         let mounted = Vector3::new(cos * lx - sin * ly, sin * lx + cos * ly, 0.0);
         // A late measurement is off by how far the instrument moved meanwhile.
         let twists = self.twists_before(propagation.intervals.end, measured.t_s, twist);

@@ -8,8 +8,9 @@ use kinematics::InstructionSet;
 use model_term::ModelTerm;
 use rayon::prelude::*;
 
-use crate::filter::{Filter, FilterRun, InnovationComponent};
+use crate::filter::{Filter, FilterRun};
 use crate::group_extrinsics::GroupResponse;
+use crate::innovation::InnovationComponent;
 use crate::kinematic_samples::KinematicSample;
 use crate::layout::Layout;
 use crate::model::{Column, Model};

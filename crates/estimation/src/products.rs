@@ -27,7 +27,8 @@ impl Products {
     /// A fit steps along its `free` columns alone: products of two others stay zero. `None`: all are taken.
     pub(crate) fn of(layout: Layout, parts: &[usize], free: Option<&[Column]>) -> Self {
         let common = layout.columns() - parts.iter().sum::<usize>();
-        let is_free = |free: &[Column], row: usize| free.iter().any(|column| column.index() == layout.in_equations(row));
+        let is_free =
+            |free: &[Column], row: usize| free.iter().any(|column| column.index() == layout.in_equations(row));
         let is_taken = |row: &usize| free.is_none_or(|free| is_free(free, *row));
         let rows = (0..common).filter(is_taken).collect();
         let mut first = Vec::new();
