@@ -6,7 +6,7 @@
 use crate::model::Column;
 use crate::pass_options::PassOptions;
 
-/// The columns that a filter has: those of the geometry, perhaps those of the instruments, and those of terms.
+/// The columns that a filter has: those of the geometry, perhaps those of instruments, those of terms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Layout {
     /// Whether the columns of the instruments are among them.

@@ -32,13 +32,13 @@ enum Carries {
     OfCounts,
     /// The robot's, since a start: nothing is known of the counts' rounding.
     SinceStart { own: OwnVariance },
-    /// The robot's, since a measurement after the counts had changed. `rounding` is Q at the heading of the
-    /// counts' pose, `None` after that has moved.
+    /// The robot's, since a measurement after the counts had changed. `heading` is the sine and cosine of
+    /// that of the counts' pose, `None` after it has moved.
     SinceMeasurement {
         own: OwnVariance,
         pose: Pose,
         covariance: Covariance,
-        rounding: Option<Matrix3<f64>>,
+        heading: Option<(f64, f64)>,
         by_noise: [[f64; NOISES]; 3],
     },
 }
@@ -164,15 +164,14 @@ impl Rounding {
             return;
         }
         let covariance = *state.covariance;
-        let rounding = own.pose.turned(heading);
-        *state.covariance = Covariance::of([&(covariance.matrix(0) + rounding)]);
+        *state.covariance = Covariance::of([&(covariance.matrix(0) + own.pose.turned(heading))]);
         self.by.copy_from(state.by);
         self.covariance_by = *state.covariance_by;
         self.carries = Carries::SinceMeasurement {
             own,
             pose: *state.pose,
             covariance,
-            rounding: Some(rounding),
+            heading: Some(heading),
             by_noise: *state.pose_by_noise,
         };
     }
@@ -180,8 +179,8 @@ impl Rounding {
     /// The robot moves within a row: what the counts say of it moves as well.
     #[inline(always)]
     pub(crate) fn advance(&mut self, step: &Step<'_>) {
-        if let Carries::SinceMeasurement { pose, covariance, rounding, by_noise, .. } = &mut self.carries {
-            *rounding = None;
+        if let Carries::SinceMeasurement { pose, covariance, heading, by_noise, .. } = &mut self.carries {
+            *heading = None;
             let (by, covariance_by) = (&mut self.by, &mut self.covariance_by);
             FilterState { pose, covariance, by, covariance_by, pose_by_noise: by_noise }.advance(step);
         }
@@ -211,9 +210,10 @@ impl Rounding {
                 let covariance = state.covariance.matrix(0) + own.pose.in_room(state.pose.theta_rad);
                 *state.covariance = Covariance::of([&covariance]);
             }
-            Carries::SinceMeasurement { own, pose, covariance, rounding, by_noise } => {
+            Carries::SinceMeasurement { own, pose, covariance, heading, by_noise } => {
                 let covariance = covariance.matrix(0);
-                let entered = covariance + rounding.unwrap_or_else(|| own.pose.in_room(pose.theta_rad));
+                let heading = heading.unwrap_or_else(|| sin_cos(pose.theta_rad));
+                let entered = covariance + own.pose.turned(heading);
                 // Nothing was rounded, or nothing is known of the pose: no measurement says anything of it.
                 let Some(inverse) = entered.try_inverse() else { return };
                 let gain = covariance * inverse;

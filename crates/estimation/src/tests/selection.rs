@@ -162,7 +162,7 @@ fn phases_that_take_the_same_of_a_run_count_it_as_often_and_filter_it_alike() {
     }
 }
 
-/// The fit of every measurement is the first step of the one that thins: going on from it gives the same bits.
+/// The fit of every measurement is the first step of the one that thins.
 #[test]
 fn a_fit_of_every_measurement_is_thinned_to_the_bits_of_one_that_thins_from_the_start() {
     let dataset = displacement_dataset(&DISPLACEMENTS, 0.7, 3);
