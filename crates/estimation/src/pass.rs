@@ -141,11 +141,11 @@ pub(crate) fn pass(
         let propagations = &selection.propagations;
         // How many phases from this one on take the same of a run: it is filtered once for them.
         let times: Vec<usize> = runs.iter().map(|run| Selection::times_in_a_row(&selections[phase..], run)).collect();
-        let of_run = |number: usize, equations: &mut NormalEquations, terms: &mut [Box<dyn ModelTerm>]| {
+        let of_run = |number_of_run: usize, equations: &mut NormalEquations, terms: &mut [Box<dyn ModelTerm>]| {
             let mut carried: Option<CarriedState> = None;
-            let segments = &runs[number];
-            let (mut found, mut own) = (Vec::with_capacity(segments.len()), Vec::with_capacity(segments.len()));
-            if repeated[number].is_some() {
+            let segments = &runs[number_of_run];
+            let (mut found, mut own) = (Vec::with_capacity(segments.len()), Vec::new());
+            if repeated[number_of_run].is_some() {
                 return found;
             }
             for number in segments.clone() {
@@ -155,13 +155,19 @@ pub(crate) fn pass(
                 if unobservable && (!remember || records.segments[number].start == Start::MeasuredPose) {
                     continue;
                 }
-                let (equations, of_segment) = of_segment((phase, number), &propagations[number], terms, &mut carried);
+                let (own_equations, of_segment) =
+                    of_segment((phase, number), &propagations[number], terms, &mut carried);
                 if !unobservable {
-                    own.push(equations);
+                    // Of many displacements and columns they are large: none is kept that is not to be repeated.
+                    if times[number_of_run] == 1 {
+                        equations.add(&own_equations, weight);
+                    } else {
+                        own.push(own_equations);
+                    }
                     found.push(of_segment);
                 }
             }
-            for _ in 0..times[number] {
+            for _ in 0..times[number_of_run] {
                 own.iter().for_each(|own| equations.add(own, weight));
             }
             found
