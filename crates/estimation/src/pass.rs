@@ -158,7 +158,7 @@ pub(crate) fn pass(
                 let (own_equations, of_segment) =
                     of_segment((phase, number), &propagations[number], terms, &mut carried);
                 if !unobservable {
-                    // Of many displacements and columns they are large: none is kept that is not to be repeated.
+                    // Those of many displacements are large: kept only where they are repeated.
                     if times[number_of_run] == 1 {
                         equations.add(&own_equations, weight);
                     } else {
