@@ -89,11 +89,13 @@ pub(crate) fn mean_structure<'a>(
 ) -> MeanStructure<'a> {
     let (base, model) = search_beside_timing_noise(base, catalogue);
     // A large effect in few measurements looks like outliers: what a search among all measurements finds.
-    let ungated = if model.has_outliers() { search_ungated(&base, &model.found, catalogue) } else { None };
+    let open = if model.has_outliers() { base.refit_ungated().ok() } else { None };
+    let ungated = open.as_ref().and_then(|open| search_ungated((&base, open), &model.found, catalogue));
     let model = ungated.map_or(model, MeanModel::of_effects);
     // If no effect explains them, but residuals depend on something: sparse terms among all measurements.
     let unexplained = model.has_outliers() && model.found.model.candidates.is_empty() && model.shows_dependence();
-    let model = match if unexplained { UncataloguedTerms::ungated_terms(&base) } else { None } {
+    let terms = open.filter(|_| unexplained).and_then(|open| UncataloguedTerms::ungated_terms((&base, &open)));
+    let model = match terms {
         Some(unlisted) => model.with_terms(unlisted),
         None => model,
     };
@@ -187,7 +189,7 @@ fn thin_if_autocorrelated<'a>(
         let model = model.with_terms(UncataloguedTerms::from(&base, sparse));
         return Decorrelated { base, model, correlated: None, spurious };
     }
-    let Ok(thinned) = THINNED.fit(&sessions(datasets)) else {
+    let Ok(thinned) = base.thinned_further().unwrap_or_else(|| THINNED.fit(&sessions(datasets))) else {
         return Decorrelated { base, model, correlated: None, spurious };
     };
     let correlated = Some(model.checked.correlation);

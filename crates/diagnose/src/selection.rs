@@ -247,12 +247,11 @@ pub(crate) fn search<'a>(
 /// What an ungated search finds. A large effect that shows in few measurements makes them outliers, and
 /// among the others it is not detected.
 pub(crate) fn search_ungated<'a>(
-    base: &ModelFit<'a>,
+    (base, open): (&ModelFit<'a>, &ModelFit<'a>),
     found: &SearchResult<'a>,
     catalogue: &[Candidate],
 ) -> Option<SearchResult<'a>> {
-    let open = base.refit_ungated().ok()?;
-    let bold = search(&open, catalogue, SCAN_LEVEL, FitCache::default());
+    let bold = search(open, catalogue, SCAN_LEVEL, FitCache::default());
     if bold.model.candidates.is_empty() {
         return None;
     }

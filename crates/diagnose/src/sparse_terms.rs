@@ -57,11 +57,9 @@ impl<'a> UncataloguedTerms<'a> {
     }
 
     /// Terms that an ungated search finds: what is large in few measurements makes them outliers.
-    pub(crate) fn ungated_terms(base: &ModelFit<'a>) -> Option<Self> {
-        let open = base.refit_ungated().ok()?;
-        let first =
-            sparse(&open, &AugmentedModel::base(&open), SPARSE_TERM_LEVEL).filter(|first| !first.drifts_more)?;
-        let all = Self::from(&open, first);
+    pub(crate) fn ungated_terms((base, open): (&ModelFit<'a>, &ModelFit<'a>)) -> Option<Self> {
+        let first = sparse(open, &AugmentedModel::base(open), SPARSE_TERM_LEVEL).filter(|first| !first.drifts_more)?;
+        let all = Self::from(open, first);
         let log_trials = all.log_trials();
         Some(Self { model: regated(all.model, base, &AugmentedModel::base(base), log_trials)?, tried: all.tried })
     }

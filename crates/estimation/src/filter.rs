@@ -12,7 +12,9 @@ use nalgebra::{Matrix3, Vector3, Vector4};
 use crate::covariances::{Covariance, Covariances};
 use crate::derivatives::Derivatives;
 use crate::filter_state::{FilterState, Step, Update};
+use crate::innovation::InnovationComponent;
 use crate::kinematic_samples::KinematicSample;
+use crate::layout::Layout;
 use crate::model::{Column, Instrument, Model};
 use crate::noise::{NOISES, Noise, NoiseComponent};
 use crate::noise_score::{JointUpdate, NoiseScore, TimingScore};
@@ -25,21 +27,6 @@ use crate::segment::{MeasuredPose, Segment, Start};
 use crate::settings::{OUTLIER_CHI_SQUARE, RESTART_AFTER_OUTLIERS};
 use crate::thinning::PropagationInterval;
 
-/// One whitened component of a measurement's innovation.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct InnovationComponent {
-    /// Which segment.
-    pub segment: usize,
-    /// Which measurement of the segment.
-    pub measurement: usize,
-    /// 0 along the robot, 1 across, 2 heading.
-    pub component: usize,
-    /// Over its standard deviation.
-    pub z: f64,
-    /// That standard deviation: metres, or radians of a heading.
-    pub sigma: f64,
-}
-
 /// The filter of one segment.
 pub(super) struct Filter<'f, 'a> {
     segment: &'f Segment<'a>,
@@ -48,11 +35,14 @@ pub(super) struct Filter<'f, 'a> {
     instrument: Instrument,
     noise: &'f Noise,
     propagator: Propagator<'f, 'a>,
+    layout: Layout,
     pass_options: PassOptions<'f>,
     pose: Pose,
     covariance: Covariance,
     /// ∂pose/∂column.
     by: Derivatives,
+    /// ∂pose/∂latency at the start.
+    start_velocity: Vector3<f64>,
     /// Derivatives of the covariance and of the pose by the logarithm of each variance.
     covariance_by: Covariances<NOISES>,
     pose_by_noise: [[f64; NOISES]; 3],
@@ -134,9 +124,9 @@ impl<'f, 'a> Filter<'f, 'a> {
         terms: &'f mut [Box<dyn ModelTerm>],
         pass_options: PassOptions<'f>,
     ) -> Self {
-        let columns = Column::BASE.len() + terms.iter().map(|term| term.parameters().len()).sum::<usize>();
+        let layout = products.layout();
         // One more for a free heading.
-        let all = columns + 1;
+        let all = layout.columns() + 1;
         let mut propagator = Propagator::new(segment, model, terms);
         if pass_options.samples {
             propagator.take_samples();
@@ -148,15 +138,17 @@ impl<'f, 'a> Filter<'f, 'a> {
             instrument: model.instrument(segment.run),
             noise,
             propagator,
+            layout,
             pass_options,
             pose: Pose::IDENTITY,
             covariance: Covariance::ZERO,
             by: Derivatives::zeros(all),
+            start_velocity: Vector3::zeros(),
             covariance_by: Covariances::ZERO,
             pose_by_noise: [[0.0; NOISES]; 3],
             rounding: Rounding::new(segment.quantum_rad, all),
-            by_measurement: Derivatives::zeros(columns - Column::BASE.len()),
-            sums: Sums::new(columns, products),
+            by_measurement: Derivatives::zeros(layout.parameters),
+            sums: Sums::new(products),
             innovations: Vec::new(),
             samples: Vec::new(),
             outliers: Vec::new(),
@@ -228,8 +220,7 @@ impl<'f, 'a> Filter<'f, 'a> {
     /// Covariance of the pose by the error of the instant that it starts at.
     #[inline(always)]
     fn of_start_instant(&self) -> Matrix3<f64> {
-        let velocity = self.by.get(Column::Latency.index());
-        velocity * velocity.transpose() * self.noise.timing_s2
+        self.start_velocity * self.start_velocity.transpose() * self.noise.timing_s2
     }
 
     /// How the pose moves as the heading of the measurement that it starts at turns.
@@ -261,16 +252,19 @@ impl<'f, 'a> Filter<'f, 'a> {
             theta_rad + late * moved.z,
         );
         self.by.clear();
-        self.by.set(Column::SensorX.index(), Vector3::new(-cos, -sin, 0.0));
-        self.by.set(Column::SensorY.index(), Vector3::new(sin, -cos, 0.0));
-        self.by.set(Column::SensorTheta.index(), Vector3::new(-mounted.y, mounted.x, -1.0));
-        self.by.set(Column::Latency.index(), by_latency);
-        self.measurement(propagations, t_s, twist);
+        self.start_velocity = by_latency;
+        if self.layout.instruments {
+            self.by.set(Column::SensorX.index(), Vector3::new(-cos, -sin, 0.0));
+            self.by.set(Column::SensorY.index(), Vector3::new(sin, -cos, 0.0));
+            self.by.set(Column::SensorTheta.index(), Vector3::new(-mounted.y, mounted.x, -1.0));
+            self.by.set(Column::Latency.index(), by_latency);
+        }
+        self.measurement(propagations, (t_s, twist), sin_cos(self.pose.theta_rad));
         // What went before the start is not since the measurement before the next one.
         let _ = self.propagator.sample(self.pose, (self.number, 0));
         for (number, size) in self.model.term_values.iter().enumerate() {
             let measurement = self.by_measurement.get(number);
-            self.by.set(Column::Term(number).index(), -measurement);
+            self.by.set(self.layout.first_term() + number, -measurement);
             self.pose = Pose::new(
                 self.pose.x_m - size * measurement.x,
                 self.pose.y_m - size * measurement.y,
@@ -308,11 +302,10 @@ impl<'f, 'a> Filter<'f, 'a> {
     }
 
     /// Finds what the terms add to the measurement after so many propagation intervals at the pose in force,
-    /// in the room, for each parameter.
+    /// in the room, for each parameter; the pose has a heading of this sine and cosine.
     #[inline(always)]
-    fn measurement(&mut self, propagations: usize, t_s: f64, twist: Twist) {
+    fn measurement(&mut self, propagations: usize, (t_s, twist): (f64, Twist), (sin, cos): (f64, f64)) {
         self.propagator.measurement(self.pose, propagations, t_s, twist);
-        let (sin, cos) = sin_cos(self.pose.theta_rad);
         let by_measurement =
             self.by_measurement.x.iter_mut().zip(&mut self.by_measurement.y).zip(&mut self.by_measurement.theta);
         for (((x, y), theta), gradient) in by_measurement.zip(&self.propagator.gradients) {
@@ -334,19 +327,21 @@ impl<'f, 'a> Filter<'f, 'a> {
         }
         let Moved { motion, by_geometry } = self.propagator.moved(self.pose, number, propagation);
         let [wheel, turn, ..] = self.noise.variance;
-        let Self { pose, covariance, by, covariance_by, pose_by_noise, rounding, propagator, pass_options, .. } = self;
+        let (layout, noise_score) = (self.layout, self.pass_options.noise_score);
+        let Self { pose, covariance, by, covariance_by, pose_by_noise, rounding, propagator, .. } = self;
         let step = Step {
             motion,
             by_geometry,
             by_terms: &propagator.propagation_by_terms,
+            first_term: layout.first_term(),
             noise: &propagation.noise,
             variance: [wheel, turn],
-            noise_score: pass_options.noise_score,
+            noise_score,
         };
         rounding.advance(&step);
         let mut state = FilterState { pose, covariance, by, covariance_by, pose_by_noise };
         state.advance(&step);
-        rounding.pass(&mut state, pass_options.noise_score);
+        rounding.pass(&mut state, noise_score);
     }
 
     /// Takes a measurement; false, and nothing changes, when it lies too far off.
@@ -356,14 +351,14 @@ impl<'f, 'a> Filter<'f, 'a> {
         let Some(interval) = self.segment.intervals[propagation.intervals.clone()].last().copied() else { return true };
         let variance = self.variance_of(&measured);
         let model = self.model;
+        let (sin, cos) = sin_cos(self.pose.theta_rad);
         let (rounding, mut state) = self.rounded();
-        rounding.enter(&mut state, variance, interval.interpolated_rad2[1], model);
+        rounding.enter(&mut state, variance, interval.interpolated_rad2[1], (model, (sin, cos)));
         let twist = self.propagator.twist(interval.rate_at_ends_rad_s[1]);
-        self.measurement(number + 1, measured.t_s, twist);
+        self.measurement(number + 1, (measured.t_s, twist), (sin, cos));
         let sample = self.propagator.sample(self.pose, (self.number, propagation.measurement));
         let Instrument { body_from_sensor: Pose { x_m: lx, y_m: ly, theta_rad: ltheta }, latency_s: late } =
             self.instrument;
-        let (sin, cos) = sin_cos(self.pose.theta_rad);
         let mounted = Vector3::new(cos * lx - sin * ly, sin * lx + cos * ly, 0.0);
         // A late measurement is off by how far the instrument moved meanwhile.
         let twists = self.twists_before(propagation.intervals.end, measured.t_s, twist);
@@ -436,11 +431,13 @@ impl<'f, 'a> Filter<'f, 'a> {
             if self.pass_options.noise_score && correlated.is_none() {
                 self.score_noise(component, update, r[component]);
             }
-            for (direct, by) in self.direct[Column::SensorX.index()..].iter_mut().zip(&mounted_by) {
-                *direct = axis.dot(by);
+            if self.layout.instruments {
+                for (direct, by) in self.direct[Column::SensorX.index()..].iter_mut().zip(&mounted_by) {
+                    *direct = axis.dot(by);
+                }
             }
             for (direct, measurement) in
-                self.direct[Column::BASE.len()..].iter_mut().zip(self.by_measurement.along(axis))
+                self.direct[self.layout.first_term()..].iter_mut().zip(self.by_measurement.along(axis))
             {
                 *direct = measurement;
             }

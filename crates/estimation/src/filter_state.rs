@@ -5,7 +5,6 @@ use nalgebra::Vector3;
 
 use crate::covariances::{Covariance, Covariances};
 use crate::derivatives::Derivatives;
-use crate::model::Column;
 use crate::noise::{NOISES, NoiseComponent};
 
 /// The filter's state, with its derivatives.
@@ -25,6 +24,8 @@ pub(crate) struct Step<'s> {
     pub(crate) motion: Pose,
     pub(crate) by_geometry: [Vector3<f64>; 3],
     pub(crate) by_terms: &'s Derivatives,
+    /// Where the columns of terms begin.
+    pub(crate) first_term: usize,
     /// Covariances by the noise of wheels and turns in force.
     pub(crate) noise: &'s Covariances<2>,
     pub(crate) variance: [f64; 2],
@@ -36,7 +37,7 @@ impl FilterState<'_> {
     /// Moves on.
     #[inline(always)]
     pub(crate) fn advance(&mut self, step: &Step<'_>) {
-        let Step { motion, by_geometry, by_terms, noise, variance, noise_score } = *step;
+        let Step { motion, by_geometry, by_terms, first_term, noise, variance, noise_score } = *step;
         let (sin, cos) = sin_cos(self.pose.theta_rad);
         let room = |v: Vector3<f64>| Vector3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z);
         let step = room(Vector3::new(motion.x_m, motion.y_m, motion.theta_rad));
@@ -44,7 +45,7 @@ impl FilterState<'_> {
         for (column, of_propagation) in by_geometry.into_iter().enumerate() {
             self.by.set(column, self.by.get(column) + room(of_propagation));
         }
-        self.by.add_turned(Column::BASE.len(), (sin, cos), by_terms);
+        self.by.add_turned(first_term, (sin, cos), by_terms);
         *self.pose = Pose::new(self.pose.x_m + step.x, self.pose.y_m + step.y, self.pose.theta_rad + step.z);
         let noise = noise.turned((sin, cos)).times(variance);
         self.covariance.carry(-step.y, step.x);

@@ -23,7 +23,9 @@ mod error;
 mod filter;
 mod filter_state;
 mod group_extrinsics;
+mod innovation;
 mod kinematic_samples;
+mod layout;
 mod log_dead_reckoning;
 mod map_distortion;
 mod maximum_likelihood;
@@ -67,7 +69,7 @@ mod wheel_rates;
 
 pub use dead_reckoned_ends::EndError;
 pub use error::{EstimationError, WrappedCounter, refuse_wrapped_counters};
-pub use filter::InnovationComponent;
+pub use innovation::InnovationComponent;
 pub use kinematic_samples::KinematicSample;
 pub use log_dead_reckoning::{LogDeadReckoning, LogPose};
 pub use maximum_likelihood::FitSettings;

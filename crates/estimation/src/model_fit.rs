@@ -306,12 +306,13 @@ impl ModelFit<'_> {
     }
 
     /// The normal equations of the same pass for terms that are tested one by one: the last parameters come
-    /// in parts of these sizes, and columns of two parts have no products.
+    /// in parts of these sizes, and columns of two parts have no products. Neither have columns that are not
+    /// free.
     #[must_use]
     pub fn scan_parts(&self, terms: &mut [Box<dyn ModelTerm>], parts: &[usize]) -> Vec<NormalEquations> {
         let (model, gate) = (self.with_zero_terms(terms), self.gate());
         let Solution { noise, free_headings, .. } = &self.solution;
-        let pass_options = PassOptions { parts, gate, ..PassOptions::default() };
+        let pass_options = PassOptions { parts, gate, free: Some(&self.columns), ..PassOptions::default() };
         pass(&self.records, &self.selections, &model, noise, free_headings, terms, pass_options).runs
     }
 

@@ -115,7 +115,7 @@ pub(crate) fn filter_taken(
     terms: &mut [Box<dyn ModelTerm>],
 ) -> Filtered {
     let columns = Column::BASE.len() + terms.iter().map(|term| term.parameters().len()).sum::<usize>();
-    let mut sums = Sums::new(columns, products);
+    let mut sums = Sums::new(products);
     let mut filter = PartialFilter::new(segment, taken, poses.start(segment, model), columns);
     let mut propagator = Propagator::new(&segment.segment, model, terms);
     propagator.restart();
@@ -155,7 +155,7 @@ pub(crate) fn filter_taken(
             filter.forget(at);
         }
     }
-    let equations = sums.eliminated(segment.segment.run, columns).0;
+    let equations = sums.eliminated(segment.segment.run).0;
     Filtered { equations, score: filter.noise_by.score, outliers: filter.rejected }
 }
 

@@ -2,14 +2,17 @@
 
 use std::mem::{Discriminant, discriminant};
 use std::ops::Range;
+use std::sync::Arc;
 
 use kinematics::InstructionSet;
 use model_term::ModelTerm;
 use rayon::prelude::*;
 
-use crate::filter::{Filter, FilterRun, InnovationComponent};
+use crate::filter::{Filter, FilterRun};
 use crate::group_extrinsics::GroupResponse;
+use crate::innovation::InnovationComponent;
 use crate::kinematic_samples::KinematicSample;
+use crate::layout::Layout;
 use crate::model::{Column, Model};
 use crate::noise::Noise;
 use crate::noise_score::{NoiseScore, TimingScore};
@@ -91,10 +94,12 @@ pub(crate) fn pass(
     terms: &mut [Box<dyn ModelTerm>],
     pass_options: PassOptions<'_>,
 ) -> Pass {
-    let columns = Column::BASE.len() + terms.iter().map(|term| term.parameters().len()).sum::<usize>();
+    let parameters = terms.iter().map(|term| term.parameters().len()).sum::<usize>();
     // Where groups have instruments of their own, these are columns to solve for, too.
     let free = pass_options.free.filter(|_| model.own.is_none());
-    let products = Products::of(columns, pass_options.parts, free);
+    let layout = Layout::of(&pass_options, parameters, model.own.is_some());
+    let columns = layout.columns_of_equations();
+    let products = Products::of(layout, pass_options.parts, free);
     let mut result = Pass::nothing();
     let weight = 1.0 / selections.len() as f64;
     let runs = runs(&records.segments);
@@ -115,7 +120,7 @@ pub(crate) fn pass(
         if let Some((cached, change)) = &reused {
             filter.take_propagations(cached.reused(phase, number, change));
         } else if pass_options.keep {
-            filter.take_propagations(PropagationSource::cached(propagations.len(), columns - Column::BASE.len()));
+            filter.take_propagations(PropagationSource::cached(propagations.len(), parameters));
         }
         let free_heading_rad = free_headings[number];
         // Loops over a dozen columns: eight at a time leave more over than they save.
@@ -124,16 +129,25 @@ pub(crate) fn pass(
         let samples = std::mem::take(&mut filter.samples);
         let timing = filter.timing;
         let (sums, outliers, innovations, noise_score, cached) = filter.into_parts();
-        let (equations, heading) = sums.eliminated(segment.run, columns);
+        let (equations, heading) = sums.eliminated(segment.run);
+        let cached = cached.map(Arc::new);
         (equations, OfSegment { number, heading, innovations, samples, outliers, noise_score, timing, cached })
     };
     let mut phases = Vec::with_capacity(selections.len());
     let mut outliers = Vec::with_capacity(selections.len());
+    // Of each run in the phase before, where this phase takes the same of it.
+    let mut repeated: Vec<Option<Vec<OfSegment>>> = vec![None; runs.len()];
     for (phase, selection) in selections.iter().enumerate() {
         let propagations = &selection.propagations;
-        let of_run = |segments: &Range<usize>, equations: &mut NormalEquations, terms: &mut [Box<dyn ModelTerm>]| {
+        // How many phases from this one on take the same of a run: it is filtered once for them.
+        let times: Vec<usize> = runs.iter().map(|run| Selection::times_in_a_row(&selections[phase..], run)).collect();
+        let of_run = |number_of_run: usize, equations: &mut NormalEquations, terms: &mut [Box<dyn ModelTerm>]| {
             let mut carried: Option<CarriedState> = None;
-            let mut found = Vec::with_capacity(segments.len());
+            let segments = &runs[number_of_run];
+            let (mut found, mut own) = (Vec::with_capacity(segments.len()), Vec::new());
+            if repeated[number_of_run].is_some() {
+                return found;
+            }
             for number in segments.clone() {
                 let unobservable = propagations[number].is_empty();
                 // The state of terms, and what samples hold, go on over displacements that are not taken.
@@ -141,11 +155,20 @@ pub(crate) fn pass(
                 if unobservable && (!remember || records.segments[number].start == Start::MeasuredPose) {
                     continue;
                 }
-                let (own, of_segment) = of_segment((phase, number), &propagations[number], terms, &mut carried);
+                let (own_equations, of_segment) =
+                    of_segment((phase, number), &propagations[number], terms, &mut carried);
                 if !unobservable {
-                    equations.add(&own, weight);
+                    // Those of many displacements are large: kept only where they are repeated.
+                    if times[number_of_run] == 1 {
+                        equations.add(&own_equations, weight);
+                    } else {
+                        own.push(own_equations);
+                    }
                     found.push(of_segment);
                 }
+            }
+            for _ in 0..times[number_of_run] {
+                own.iter().for_each(|own| equations.add(own, weight));
             }
             found
         };
@@ -153,28 +176,40 @@ pub(crate) fn pass(
         let work = |propagation: &PropagationInterval| {
             if pass_options.by.is_some() { 1 } else { propagation.intervals.len().max(1) }
         };
-        let at_once = propagations.iter().flatten().map(work).sum::<usize>() >= MIN_PARALLEL_WORK;
-        let found: Vec<Vec<OfSegment>> = if at_once && !has_memory {
+        let new = runs.iter().zip(&repeated).filter(|(_, repeated)| repeated.is_none());
+        let work_of = |run: &Range<usize>| propagations[run.clone()].iter().flatten().map(work).sum::<usize>();
+        let at_once = new.map(|(run, _)| work_of(run)).sum::<usize>() >= MIN_PARALLEL_WORK;
+        let mut found: Vec<Vec<OfSegment>> = if at_once && !has_memory {
+            let is_repeated = |segment: usize| repeated[runs.partition_point(|run| run.end <= segment)].is_some();
             let of = |number: usize| {
-                (!propagations[number].is_empty())
+                (!propagations[number].is_empty() && !is_repeated(number))
                     .then(|| of_segment((phase, number), &propagations[number], &mut [], &mut None))
             };
             let mut ready: Vec<_> = (0..propagations.len()).into_par_iter().map(of).collect();
-            let in_run = |(segments, equations): (&Range<usize>, &mut NormalEquations)| {
+            let in_run = |((segments, equations), times): ((&Range<usize>, &mut NormalEquations), &usize)| {
                 let ready = ready[segments.clone()].iter_mut().filter_map(Option::take);
-                ready.map(|(own, of_segment)| (equations.add(&own, weight), of_segment).1).collect()
+                let (own, found): (Vec<_>, Vec<_>) = ready.unzip();
+                for _ in 0..*times {
+                    own.iter().for_each(|own| equations.add(own, weight));
+                }
+                found
             };
-            runs.iter().zip(&mut result.runs).map(in_run).collect()
+            runs.iter().zip(&mut result.runs).zip(&times).map(in_run).collect()
         } else if at_once {
             // Segments of a run follow each other, as terms have a state; each run starts anew.
-            let in_run = |terms: &mut Vec<Box<dyn ModelTerm>>,
-                          (segments, equations): (&Range<usize>, &mut NormalEquations)| {
-                of_run(segments, equations, terms)
+            let in_run = |terms: &mut Vec<Box<dyn ModelTerm>>, (number, equations): (usize, &mut NormalEquations)| {
+                of_run(number, equations, terms)
             };
-            runs.par_iter().zip(&mut result.runs).map_init(|| terms.to_vec(), in_run).collect()
+            result.runs.par_iter_mut().enumerate().map_init(|| terms.to_vec(), in_run).collect()
         } else {
-            runs.iter().zip(&mut result.runs).map(|(segments, equations)| of_run(segments, equations, terms)).collect()
+            result.runs.iter_mut().enumerate().map(|(number, equations)| of_run(number, equations, terms)).collect()
         };
+        for ((found, repeated), times) in found.iter_mut().zip(&mut repeated).zip(times) {
+            if let Some(repeated) = repeated.take() {
+                *found = repeated;
+            }
+            *repeated = (times > 1).then(|| found.clone());
+        }
         let reused = found.iter().flatten().map(|of| of.innovations.len()).sum();
         let mut innovations = Vec::with_capacity(reused);
         let mut samples = Vec::new();
@@ -207,6 +242,8 @@ pub(crate) fn pass(
     for (phase, (selection, rejected)) in with_partial.enumerate() {
         let poses = TakenPoses::of(&records.segments, free_headings, &selection.propagations, rejected);
         let part = (records, selection, weight);
+        // Partial measurements have derivatives by all columns.
+        let products = Products::of(Layout::whole(parameters), pass_options.parts, free);
         let found = add_partial(&mut result, part, (&poses, pass_options.gate), (model, noise), &products, terms);
         if phase == 0 {
             result.partial_outliers = found;
@@ -300,6 +337,7 @@ fn runs(segments: &[Segment<'_>]) -> Vec<Range<usize>> {
 }
 
 /// What one segment gives in one phase, beside its normal equation.
+#[derive(Clone)]
 struct OfSegment {
     number: usize,
     heading: Option<(f64, Vec<f64>)>,
@@ -308,5 +346,5 @@ struct OfSegment {
     outliers: Vec<usize>,
     noise_score: NoiseScore,
     timing: TimingScore,
-    cached: Option<SegmentCache>,
+    cached: Option<Arc<SegmentCache>>,
 }

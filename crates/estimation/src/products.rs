@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::layout::Layout;
 use crate::model::Column;
 use crate::normal_equations::NormalEquations;
 use crate::settings::MIN_VARIANCE_PRODUCT;
@@ -10,6 +11,7 @@ use crate::settings::MIN_VARIANCE_PRODUCT;
 /// candidates that are tested one by one need none with each other.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Products {
+    layout: Layout,
     /// Number of the first columns, which have products with all.
     common: usize,
     /// Those of the first columns whose products are taken, in order.
@@ -19,19 +21,28 @@ pub(crate) struct Products {
 }
 
 impl Products {
-    /// Of so many columns, the last of which come in parts: those of a part have products with what comes
-    /// before all parts, and with each other.
+    /// Of columns the last of which come in parts: those of a part have products with what comes before all
+    /// parts, and with each other.
     ///
     /// A fit steps along its `free` columns alone: products of two others stay zero. `None`: all are taken.
-    pub(crate) fn of(columns: usize, parts: &[usize], free: Option<&[Column]>) -> Self {
-        let common = columns - parts.iter().sum::<usize>();
-        let is_taken = |row: &usize| free.is_none_or(|free| free.iter().any(|column| column.index() == *row));
+    pub(crate) fn of(layout: Layout, parts: &[usize], free: Option<&[Column]>) -> Self {
+        let common = layout.columns() - parts.iter().sum::<usize>();
+        let is_free =
+            |free: &[Column], row: usize| free.iter().any(|column| column.index() == layout.in_equations(row));
+        let is_taken = |row: &usize| free.is_none_or(|free| is_free(free, *row));
         let rows = (0..common).filter(is_taken).collect();
         let mut first = Vec::new();
         for part in parts {
             first.extend(std::iter::repeat_n(common + first.len(), *part));
         }
-        Self { common, rows, first }
+        Self { layout, common, rows, first }
+    }
+}
+
+impl Products {
+    /// The columns.
+    pub(crate) const fn layout(&self) -> Layout {
+        self.layout
     }
 }
 
@@ -55,10 +66,10 @@ pub(crate) struct Sums<'p> {
 }
 
 impl<'p> Sums<'p> {
-    /// Of no innovation; the columns are those of the normal equation.
-    pub(crate) fn new(columns: usize, products: &'p Products) -> Self {
+    /// Of no innovation.
+    pub(crate) fn new(products: &'p Products) -> Self {
         // One more for a free heading.
-        let columns = columns + 1;
+        let columns = products.layout.columns() + 1;
         let own = products.first.iter().enumerate().map(|(further, first)| products.common + further + 1 - first).sum();
         Self {
             products,
@@ -118,45 +129,56 @@ impl<'p> Sums<'p> {
         }
     }
 
-    /// The products of all columns but the heading; those that are not taken are zero.
-    fn information(&self, columns: usize) -> DMatrix<f64> {
+    /// The products of all columns of a normal equation; those that are not taken are zero.
+    fn information(&self) -> DMatrix<f64> {
+        let Products { layout, common, rows, first } = self.products;
+        let columns = layout.columns_of_equations();
         let mut information = DMatrix::zeros(columns, columns);
         let mut set = |row: usize, column: usize, value: f64| {
-            information[(row, column)] = value;
-            information[(column, row)] = value;
+            let at = (layout.in_equations(row), layout.in_equations(column));
+            information[at] = value;
+            information[(at.1, at.0)] = value;
         };
-        for &row in &self.products.rows {
-            let products = &self.common[row * self.columns..][..columns];
+        for &row in rows {
+            let products = &self.common[row * self.columns..][..layout.columns()];
             products[row..].iter().enumerate().for_each(|(beyond, value)| set(row, row + beyond, *value));
         }
         let mut own = self.own.iter();
-        for (further, &first) in self.products.first.iter().enumerate() {
-            let row = self.products.common + further;
+        for (further, &first) in first.iter().enumerate() {
+            let row = common + further;
             (first..=row).zip(&mut own).for_each(|(column, value)| set(row, column, *value));
         }
         information
     }
 
     /// The normal equation with the free heading eliminated, and the heading's response: its own step, and
-    /// that by each column.
-    pub(crate) fn eliminated(&self, run: (usize, usize), columns: usize) -> (NormalEquations, Option<(f64, Vec<f64>)>) {
+    /// that by each column. What is not carried is zero.
+    pub(crate) fn eliminated(&self, run: (usize, usize)) -> (NormalEquations, Option<(f64, Vec<f64>)>) {
+        let layout = self.products.layout;
+        let carried = layout.columns();
+        let of_equations = |of: &[f64]| {
+            let mut all = vec![0.0; layout.columns_of_equations()];
+            of.iter().enumerate().for_each(|(index, value)| all[layout.in_equations(index)] = *value);
+            all
+        };
         let mut equations = NormalEquations {
             run,
-            information: self.information(columns),
-            gradient: DVector::from_column_slice(&self.gradient[..columns]),
+            information: self.information(),
+            gradient: DVector::from_vec(of_equations(&self.gradient[..carried])),
             chi_square: self.chi_square,
             log_det: self.log_det + self.det.ln(),
             count: self.count,
         };
         let last = &self.common[self.products.common * self.columns..];
-        if !self.free || last[columns] <= 0.0 {
+        if !self.free || last[carried] <= 0.0 {
             return (equations, None);
         }
-        let (own, gradient) = (last[columns], self.gradient[columns]);
-        let by: Vec<f64> = last[..columns].iter().map(|cross| -cross / own).collect();
+        let (own, gradient) = (last[carried], self.gradient[carried]);
+        let cross = of_equations(&last[..carried]);
+        let by: Vec<f64> = cross.iter().map(|cross| -cross / own).collect();
         for (row, by) in by.iter().enumerate() {
             equations.gradient[row] += by * gradient;
-            for (column, cross) in last[..columns].iter().enumerate() {
+            for (column, cross) in cross.iter().enumerate() {
                 equations.information[(row, column)] += by * cross;
             }
         }

@@ -6,6 +6,7 @@
 //! squares of Δp. Small steps of a fit use cached propagations; convergence is confirmed by integrated ones.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use kinematics::{Frame, Increment, Pose, Twist, Wheels, sin_cos, sinc, sinc_derivative};
 use model_term::{Interval, Measurement, ModelTerm};
@@ -79,7 +80,7 @@ impl SegmentCache {
 #[derive(Debug, Clone)]
 pub(crate) struct CachedPropagation {
     pub(crate) model: Model,
-    pub(crate) phases: Vec<Vec<Option<SegmentCache>>>,
+    pub(crate) phases: Vec<Vec<Option<Arc<SegmentCache>>>>,
 }
 
 /// Difference of a model from that of the cache.
@@ -104,7 +105,7 @@ impl CachedPropagation {
     /// The propagations of a segment in a phase, for a model with this difference.
     pub(crate) fn reused<'k>(&'k self, phase: usize, segment: usize, change: &'k Change) -> PropagationSource<'k> {
         self.phases[phase][segment]
-            .as_ref()
+            .as_deref()
             .map_or(PropagationSource::Integrated, |propagations| PropagationSource::Cached(propagations, change))
     }
 }

@@ -32,8 +32,15 @@ enum Carries {
     OfCounts,
     /// The robot's, since a start: nothing is known of the counts' rounding.
     SinceStart { own: OwnVariance },
-    /// The robot's, since a measurement after the counts had changed.
-    SinceMeasurement { own: OwnVariance, pose: Pose, covariance: Covariance, by_noise: [[f64; NOISES]; 3] },
+    /// The robot's, since a measurement after the counts had changed. `heading` is the sine and cosine of
+    /// that of the counts' pose, `None` after it has moved.
+    SinceMeasurement {
+        own: OwnVariance,
+        pose: Pose,
+        covariance: Covariance,
+        heading: Option<(f64, f64)>,
+        by_noise: [[f64; NOISES]; 3],
+    },
 }
 
 /// What the robot's pose is off the counts' by.
@@ -81,7 +88,12 @@ impl PoseVariance {
     /// Q in the room, for a heading.
     #[inline(always)]
     pub(crate) fn in_room(&self, theta_rad: f64) -> Matrix3<f64> {
-        let (sin, cos) = sin_cos(theta_rad);
+        self.turned(sin_cos(theta_rad))
+    }
+
+    /// The same, by the heading's sine and cosine.
+    #[inline(always)]
+    fn turned(&self, (sin, cos): (f64, f64)) -> Matrix3<f64> {
         let (along, with) = (self.along_m2, self.covariance_m_rad);
         Matrix3::new(
             along * cos * cos,
@@ -134,14 +146,15 @@ impl Rounding {
         self.carries = if own.pose.matters(variance) { Carries::SinceStart { own } } else { Carries::OfCounts };
     }
 
-    /// A measurement of these variances comes: the robot's pose is carried from here on.
+    /// A measurement of these variances comes, at a heading of this sine and cosine: the robot's pose is
+    /// carried from here on.
     #[inline(always)]
     pub(crate) fn enter(
         &mut self,
         state: &mut FilterState<'_>,
         variance: [f64; 2],
         interpolated_rad2: Wheels<f64>,
-        model: &Model,
+        (model, heading): (&Model, (f64, f64)),
     ) {
         if !matches!(self.carries, Carries::OfCounts) {
             return;
@@ -151,16 +164,23 @@ impl Rounding {
             return;
         }
         let covariance = *state.covariance;
-        *state.covariance = Covariance::of([&(covariance.matrix(0) + own.pose.in_room(state.pose.theta_rad))]);
+        *state.covariance = Covariance::of([&(covariance.matrix(0) + own.pose.turned(heading))]);
         self.by.copy_from(state.by);
         self.covariance_by = *state.covariance_by;
-        self.carries = Carries::SinceMeasurement { own, pose: *state.pose, covariance, by_noise: *state.pose_by_noise };
+        self.carries = Carries::SinceMeasurement {
+            own,
+            pose: *state.pose,
+            covariance,
+            heading: Some(heading),
+            by_noise: *state.pose_by_noise,
+        };
     }
 
     /// The robot moves within a row: what the counts say of it moves as well.
     #[inline(always)]
     pub(crate) fn advance(&mut self, step: &Step<'_>) {
-        if let Carries::SinceMeasurement { pose, covariance, by_noise, .. } = &mut self.carries {
+        if let Carries::SinceMeasurement { pose, covariance, heading, by_noise, .. } = &mut self.carries {
+            *heading = None;
             let (by, covariance_by) = (&mut self.by, &mut self.covariance_by);
             FilterState { pose, covariance, by, covariance_by, pose_by_noise: by_noise }.advance(step);
         }
@@ -190,9 +210,10 @@ impl Rounding {
                 let covariance = state.covariance.matrix(0) + own.pose.in_room(state.pose.theta_rad);
                 *state.covariance = Covariance::of([&covariance]);
             }
-            Carries::SinceMeasurement { own, pose, covariance, by_noise } => {
+            Carries::SinceMeasurement { own, pose, covariance, heading, by_noise } => {
                 let covariance = covariance.matrix(0);
-                let entered = covariance + own.pose.in_room(pose.theta_rad);
+                let heading = heading.unwrap_or_else(|| sin_cos(pose.theta_rad));
+                let entered = covariance + own.pose.turned(heading);
                 // Nothing was rounded, or nothing is known of the pose: no measurement says anything of it.
                 let Some(inverse) = entered.try_inverse() else { return };
                 let gain = covariance * inverse;

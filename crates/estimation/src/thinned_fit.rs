@@ -7,6 +7,7 @@ use std::sync::Arc;
 use model_term::ModelTerm;
 
 use crate::error::EstimationError;
+use crate::model::Column;
 use crate::model_fit::ModelFit;
 use crate::records::Records;
 use crate::settings::{MIN_MEASUREMENTS_PER_RUN, SPACING_SLACK, THINNING_FACTOR, THINNING_PHASES};
@@ -24,6 +25,27 @@ impl ModelFit<'_> {
             self.refit(Some(self.current_values()), &mut [])?;
         }
         Ok(())
+    }
+
+    /// The fit of the same sessions that thins poses and displacements, and estimates no nuisances. A fit by
+    /// [`FitSettings::GEOMETRY_ONLY`](crate::FitSettings::GEOMETRY_ONLY) is its first step, and is not made
+    /// again. `None` where this fit has gone on from there: with terms, noise of instants, or thinned.
+    ///
+    /// # Errors
+    /// [`EstimationError`] when it diverges.
+    pub fn thinned_further(&self) -> Option<Result<Self, EstimationError>> {
+        let is_first_step = self.thinning == Thinning::NONE
+            && !self.ungated
+            && self.prior.timing_s2 == 0.0
+            && self.unobservable.is_empty()
+            && !self.columns.iter().any(|column| matches!(column, Column::Term(_)))
+            && !self.solution.pass.innovations.is_empty();
+        is_first_step.then(|| {
+            let mut thinned = Self { displacements_in_series: true, ..self.clone() };
+            thinned.thin()?;
+            thinned.fix_unobservable()?;
+            Ok(thinned)
+        })
     }
 
     /// Measurements at a spacing of `every_s`, seconds; `None` when a run has too few left.

@@ -9,6 +9,8 @@
 //! displacement that is passed over is lost to its phase, with its motion; other phases take it.
 //! Reference: Varin, Reid & Firth 2011.
 
+use std::ops::Range;
+
 use nalgebra::Vector3;
 
 use crate::covariances::Covariances;
@@ -37,13 +39,20 @@ impl Thinning {
 /// The motion from one measurement to the next that is taken.
 #[derive(Debug, Clone)]
 pub(crate) struct PropagationInterval {
-    pub(crate) intervals: std::ops::Range<usize>,
+    pub(crate) intervals: Range<usize>,
     /// The measurement before; 0 for a displacement.
     pub(crate) from: usize,
     pub(crate) measurement: usize,
     /// Covariance of the motion, in the frame of the body at its start, for a wheel noise of 1 m²/m and for a
     /// turn noise of 1 rad²/rad.
     pub(crate) noise: Covariances<2>,
+}
+
+impl PropagationInterval {
+    /// Are both of the same measurements of a segment? Then they are the same.
+    fn is_of_same(&self, other: &Self) -> bool {
+        (&self.intervals, self.from, self.measurement) == (&other.intervals, other.from, other.measurement)
+    }
 }
 
 /// The measurements taken in one phase.
@@ -99,6 +108,15 @@ impl Selection {
         // A run's partial measurements hang together: all stand in its first block.
         let partial = if block == 0 { self.partial.clone() } else { vec![None; self.partial.len()] };
         Self { propagations, partial }
+    }
+
+    /// How many of the phases, from the first on, take the same measurements of some segments.
+    pub(crate) fn times_in_a_row(phases: &[Self], segments: &Range<usize>) -> usize {
+        let is_as_first = |phase: &&Self| {
+            let mut pairs = segments.clone().map(|at| (&phases[0].propagations[at], &phase.propagations[at]));
+            pairs.all(|(a, b)| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.is_of_same(b)))
+        };
+        phases.iter().take_while(is_as_first).count()
     }
 
     /// Does it take no measurement?
@@ -232,7 +250,7 @@ fn between_places(partial: &PartialSegment<'_>, nominal: &Model) -> Vec<Propagat
 
 /// Covariance of a propagation interval's motion for unit noises, by the nominal drive: the geometry must not
 /// be estimated by its effect on covariances.
-fn noise(segment: &Segment<'_>, intervals: std::ops::Range<usize>, nominal: &Model) -> Covariances<2> {
+fn noise(segment: &Segment<'_>, intervals: Range<usize>, nominal: &Model) -> Covariances<2> {
     let mut noise = Covariances::ZERO;
     let mut theta_rad = 0.0;
     for interval in &segment.intervals[intervals] {

@@ -192,6 +192,18 @@ fn a_fit_sums_the_products_that_it_steps_along() {
     let (all, own) = (summed(None, &[]), summed(Some(&free[..]), &[]));
     // The same sums in the same order. Rejects a row that is left out or read from another place.
     assert_eq!(own.of(&free), all.of(&free));
+    // What a fit of the geometry and terms carries no derivatives by is zero. Rejects terms that take another
+    // column's place.
+    let carried: Vec<usize> = (0..all.gradient.len())
+        .filter(|column| *column < Column::GEOMETRY.len() || *column >= Column::BASE.len())
+        .collect();
+    assert_eq!(own.gradient_of(&carried), all.gradient_of(&carried));
+    let instruments: Vec<usize> = (Column::GEOMETRY.len()..Column::BASE.len()).collect();
+    assert!(own.gradient_of(&instruments).iter().all(|gradient| *gradient == 0.0));
+    // One column of the instrument brings all of them.
+    let with_latency = [Column::LeftWheel, Column::Latency, Column::Term(1)];
+    let own = summed(Some(&with_latency[..]), &[]);
+    assert_eq!(own.of(&with_latency), all.of(&with_latency));
     assert_eq!(own.gradient, all.gradient);
     // One part of all terms has all products, too. Rejects products of the heading with other columns that
     // are lost where its row has its column's number, as without parts: the difference is then of order 1.

@@ -8,6 +8,7 @@ use super::partial::{
     GYRO, M_PER_RAD, NO_GYRO, NOISELESS, SEPARATION_M, SIGMA_M, SIGMA_RAD, all, dataset, equations, errors, fitted,
     noise, nominal, tape,
 };
+use crate::layout::Layout;
 use crate::partial_filter::filter_taken;
 use crate::partial_poses::{TakenPoses, Taking};
 use crate::pass::{Pass, pass};
@@ -142,7 +143,7 @@ fn poses_are_what_they_are_in_their_own_filter() {
     let selections = Selection::of(&records, Thinning::NONE, &nominal());
     let (model, noise) = (near_truth(), noise());
     let poses = TakenPoses::of(&records.segments, &[], &selections[0].propagations, &[]);
-    let products = Products::of(Column::BASE.len(), &[], None);
+    let products = Products::of(Layout::whole(0), &[], None);
     let own = passed(&poses_alone(dataset.clone()), &model, &noise);
     let mut score = crate::noise_score::NoiseScore::zero();
     for ((partial, propagations), own) in records.partial.iter().zip(&selections[0].partial).zip(&own.runs) {

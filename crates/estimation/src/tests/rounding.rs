@@ -112,6 +112,7 @@ fn measured_twice(moved_and_measured: [(f64, f64); 2], within_row: Option<[f64; 
             motion: Pose::new(moved_m, 0.0, 0.0),
             by_geometry: [Vector3::zeros(); 3],
             by_terms: &none,
+            first_term: Column::BASE.len(),
             noise: &Covariances::ZERO,
             variance: [0.0; 2],
             noise_score: false,
@@ -120,7 +121,8 @@ fn measured_twice(moved_and_measured: [(f64, f64); 2], within_row: Option<[f64; 
             rounding.advance(&step);
             state.advance(&step);
             rounding.pass(state, false);
-            rounding.enter(state, [1.0, 1.0], interpolated_rad2, &model);
+            let heading = kinematics::sin_cos(state.pose.theta_rad);
+            rounding.enter(state, [1.0, 1.0], interpolated_rad2, (&model, heading));
             let (h, v) = (Vector3::x(), measured - state.pose.x_m);
             let ph = Vector3::from(state.covariance.along(&h).map(|[along]| along));
             let gain = ph / (h.dot(&ph) + 1.0);

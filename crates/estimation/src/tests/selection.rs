@@ -4,6 +4,7 @@ use dataset::{Displacement, Odometry};
 
 use super::*;
 use crate::FitSettings;
+use crate::NormalEquations;
 use crate::decimation::Decimated;
 
 #[test]
@@ -114,6 +115,69 @@ fn displacements_are_thinned_where_their_errors_last_and_only_there() {
     };
     assert!(thinned(0.0) < 4);
     assert_eq!(thinned(0.7), 20);
+}
+
+#[test]
+fn phases_that_take_the_same_of_a_run_count_it_as_often_and_filter_it_alike() {
+    let dataset = dataset(true);
+    let records = Records::of(&[dataset.session()]);
+    let all = Selection::of(&records, Thinning::NONE, &MODEL).remove(0);
+    let few = Selection::of(&records, Thinning { every_s: 4.0, phases: 1 }, &MODEL).remove(0);
+    // Its first run is that of the one, its second that of the other.
+    let mut mixed = all.clone();
+    mixed.propagations[1].clone_from(&few.propagations[1]);
+    let phases = [all.clone(), all, mixed.clone(), mixed, few];
+    let times = |run: std::ops::Range<usize>| Selection::times_in_a_row(&phases, &run);
+    assert_eq!((times(0..1), times(1..2)), (4, 2));
+    let with_memory = |terms: usize| -> Vec<Box<dyn ModelTerm>> {
+        (0..terms).map(|_| Box::new(RunDistanceTerm { distance_m: 0.0 }) as Box<dyn ModelTerm>).collect()
+    };
+    let passed = |phases: &[Selection], terms: usize| {
+        let mut terms = with_memory(terms);
+        let model = Model { term_values: vec![0.001; 2 * terms.len()], ..MODEL };
+        let pass_options =
+            PassOptions { noise_score: true, innovations: true, samples: true, keep: true, ..PassOptions::default() };
+        pass(&records, phases, &model, &NOISE, &[0.0; 2], &mut terms, pass_options)
+    };
+    for terms in [0, 1] {
+        let together = passed(&phases, terms);
+        let one_by_one: Vec<Pass> = phases.iter().map(|phase| passed(std::slice::from_ref(phase), terms)).collect();
+        for (phase, alone) in one_by_one.iter().enumerate() {
+            assert_eq!(together.innovations[phase], alone.innovations[0]);
+            assert_eq!(together.samples[phase], alone.samples[0]);
+        }
+        for (number, run) in together.runs.iter().enumerate() {
+            let mut mean = NormalEquations::new(run.run, run.gradient.len());
+            one_by_one.iter().for_each(|alone| mean.add(&alone.runs[number], 0.2));
+            // The same sums in the same order. Rejects a run that counts once for phases that share it, and a
+            // run's phases that are taken for another's.
+            assert_eq!(*run, mean);
+        }
+        // Propagations that are kept serve each phase.
+        let cached = together.cached.expect("kept");
+        let model = cached.model.clone();
+        let by = PassOptions { innovations: true, by: Some(&cached), ..PassOptions::default() };
+        let again = pass(&records, &phases, &model, &NOISE, &[0.0; 2], &mut with_memory(terms), by);
+        assert_eq!(again.innovations, together.innovations);
+    }
+}
+
+/// The fit of every measurement is the first step of the one that thins.
+#[test]
+fn a_fit_of_every_measurement_is_thinned_to_the_bits_of_one_that_thins_from_the_start() {
+    let dataset = displacement_dataset(&DISPLACEMENTS, 0.7, 3);
+    let every = FitSettings::GEOMETRY_ONLY.fit(&[dataset.session()]).expect("a fit");
+    let whole = FitSettings { thin: true, thin_displacements: true, ..FitSettings::GEOMETRY_ONLY };
+    let whole = whole.fit(&[dataset.session()]).expect("a fit");
+    let further = every.thinned_further().expect("a first step").expect("a fit");
+    assert!(further.thinning != Thinning::NONE && further.thinning == whole.thinning);
+    assert_eq!(further.solution.model, whole.solution.model);
+    assert_eq!(further.solution.noise, whole.solution.noise);
+    assert_eq!(further.solution.pass.runs, whole.solution.pass.runs);
+    // Fits that have gone on are no first step.
+    assert!(further.thinned_further().is_none());
+    assert!(every.refit_ungated().expect("a fit").thinned_further().is_none());
+    assert!(every.extended(&mut [Box::new(TravelTerm)]).expect("a fit").thinned_further().is_none());
 }
 
 /// The same drive, logged several times as often.
