@@ -91,8 +91,6 @@ pub(crate) enum Doubt {
     ProbablyPartOfUnlisted,
     /// A fault of the records may do the same.
     FaultyRecords,
-    /// The instrument's map is distorted, and no test takes that into account.
-    MapDistortion,
     /// Some session or kind of path does not have it as the others give it.
     DoesNotCarryOver,
     /// The geometry that it is found beside is not that of the described robot.

@@ -6,12 +6,13 @@ use effects::GeometryRatio;
 
 use crate::anomaly_findings::of_anomalies;
 use crate::carry_over::CarryOver;
-use crate::cause::{Basis, Doubt};
+use crate::cause::Doubt;
 use crate::check::TestResult;
 use crate::clock_offsets::ClockOffset;
 use crate::finding;
 use crate::finding::Finding;
 use crate::geometry_deviations::remaining_deviations;
+use crate::map_errors::without_map_errors;
 use crate::mean_lateness::join_clock;
 use crate::mean_structure::MeanStructure;
 use crate::model_comparison::form_error_statistic;
@@ -85,7 +86,7 @@ pub(crate) fn findings(results: &StageResults<'_, '_>) -> Vec<Finding> {
         doubt_incomplete_models,
         doubt_low_significance,
         doubt_what_does_not_carry_over,
-        doubt_in_distorted_maps,
+        without_errors_of_the_map,
         without_remainders_of_stamps,
         by_significance,
     ];
@@ -245,13 +246,9 @@ fn doubt_what_does_not_carry_over(results: &StageResults<'_, '_>, mut findings: 
     findings
 }
 
-/// Errors of a map return with the place, in all runs alike: no test of a mean takes them into account.
-fn doubt_in_distorted_maps(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
-    if results.structure.base.records.map.is_some() {
-        for finding in findings.iter_mut().filter(|finding| matches!(finding.basis, Basis::Mean)) {
-            finding.or_unlisted(1.0, Doubt::MapDistortion);
-        }
-    }
+/// What the instrument's map explains by its errors, which return with the place.
+fn without_errors_of_the_map(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    without_map_errors(&mut findings, &results.structure.base, results.structure.model());
     findings
 }
 

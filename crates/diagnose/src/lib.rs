@@ -32,6 +32,7 @@ mod heterogeneity;
 mod kinds;
 mod large_errors;
 mod log_rows;
+mod map_errors;
 mod mean_lateness;
 mod mean_structure;
 mod model_comparison;

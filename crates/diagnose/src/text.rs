@@ -124,9 +124,6 @@ fn sentence(finding: &Finding) -> String {
             Doubt::OtherGeometry => {
                 format!("{sentence}; beside a geometry that is not the described robot's, it may be something else")
             }
-            Doubt::MapDistortion => {
-                format!("{sentence}; the stated distortion of the instrument's map may do the same")
-            }
             Doubt::FaultyRecords => format!("{sentence}; what is wrong with the records may do the same"),
             Doubt::DoesNotCarryOver => {
                 let why = finding.carry_over.as_ref().map_or("", |of| of.why.as_str());

@@ -1,0 +1,67 @@
+//! What is left of an effect once the errors of the instrument's map are counted.
+//!
+//! A map's error at a place returns in every run. The likelihood takes it for the robot's, and neither
+//! innovations nor the scatter over runs show it. Where the map's distortion is stated, its covariance of an
+//! effect's size is known ([`estimation::ModelFit::covariance`]): an effect is one if it is significant beside
+//! that. Errors that last while the robot crosses a patch of the map are the map's own.
+
+use effects::CATALOGUE;
+use estimation::{Column, ModelFit, RIDGE, inverse};
+use nalgebra::{DMatrix, DVector};
+
+use crate::augmented_model::{AugmentedModel, refit};
+use crate::candidate::{Candidate, terms};
+use crate::cause::Basis;
+use crate::finding::Finding;
+use crate::settings::levels::{SCAN_LEVEL, SPARSE_TERM_LEVEL};
+use crate::statistics::p_of_chi_square;
+
+/// Leaves out what a stated distortion of the map explains: terms of `model` that are not significant beside
+/// it, and signs of errors that last.
+pub(crate) fn without_map_errors(findings: &mut Vec<Finding>, base: &ModelFit<'_>, model: &AugmentedModel<'_>) {
+    if base.records.map.is_none() {
+        return;
+    }
+    findings.retain(|finding| {
+        let (trials, level) = match finding.basis {
+            Basis::FailedTests(_) | Basis::Autocorrelated(_) => return false,
+            Basis::Products(trials) => (trials, SPARSE_TERM_LEVEL),
+            _ => (CATALOGUE.len(), SCAN_LEVEL),
+        };
+        let candidate = finding.term.map(|term| &model.candidates[term]);
+        candidate
+            .is_none_or(|candidate| beside_map(base, candidate).is_some_and(|p_value| p_value * trials as f64 <= level))
+    });
+}
+
+/// The p-value of a candidate by the covariance that its size has with the map's; `None` where the fit with it
+/// diverges or has none.
+fn beside_map(base: &ModelFit<'_>, candidate: &Candidate) -> Option<f64> {
+    let model = refit(base, &AugmentedModel::base(base), vec![candidate.clone()])?;
+    let covariance = model.fit.covariance(&mut terms(&model.candidates))?;
+    let at: Option<Vec<usize>> = model.range(0).map(|term| model.fit.position(Column::Term(term))).collect();
+    let at = at?;
+    let own = DMatrix::from_fn(at.len(), at.len(), |i, j| covariance[(at[i], at[j])]);
+    Some(p_of_size(&model.estimates(0), &own))
+}
+
+/// The probability of an estimate as large or larger where the size is 0.
+fn p_of_size(estimate: &DVector<f64>, covariance: &DMatrix<f64>) -> f64 {
+    let statistic = inverse(covariance, RIDGE).map_or(0.0, |inverse| estimate.dot(&(inverse * estimate)));
+    if statistic.is_finite() { p_of_chi_square(statistic, estimate.len() as f64) } else { 1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_size_is_judged_by_its_whole_covariance() {
+        // Two sizes of variance 1 and correlation 0.8, estimated at (2, −2): 2·4/(1 − 0.8) = 40, which has the
+        // probability e^{−20} of two degrees of freedom. Rejects variances alone: 8, e^{−4}.
+        let covariance = DMatrix::from_row_slice(2, 2, &[1.0, 0.8, 0.8, 1.0]);
+        let p_value = p_of_size(&DVector::from_column_slice(&[2.0, -2.0]), &covariance);
+        // The ridge changes the statistic by 1e-10.
+        assert!((p_value / (-20.0_f64).exp() - 1.0).abs() < 1e-8, "{p_value}");
+    }
+}
