@@ -2,7 +2,7 @@
 
 Versions: Python 3.11, SQLite 3.40.1.
 
-    zstd -dc tests/ros2/humble.db3.zstd > /tmp/humble.db3 && python3 fuzz/corpus/db3/make.py /tmp/humble.db3
+    zstd -d tests/ros2/humble.db3.zstd && python3 fuzz/corpus/db3/make.py tests/ros2/humble.db3 && rm tests/ros2/humble.db3
 """
 
 import sqlite3
