@@ -221,6 +221,13 @@ fn regress_messages_do_not_say_inf_times_and_inf_turns() {
     mended("calibrators", &[7_100_223, 7_128_401, 7_142_279]);
 }
 
+/// A map's distortion was added to the covariance of a fit that determines nothing.
+#[test]
+fn regress_a_fit_that_determines_nothing_in_a_distorted_map_ends_no_process() {
+    mended("calibrators", &[40_000_024, 40_000_056]);
+    mended("diagnosis", &[40_000_027, 40_000_145]);
+}
+
 /// Which number is under way, for executions that end the process: memory that runs out, a stack that does.
 fn note(line: &str) {
     if let Ok(file) = std::env::var("YAIR_FUZZ_NOTE") {
