@@ -77,7 +77,7 @@ fn chunk(records: &[Record], random: &mut impl Rng) -> Record {
 }
 
 /// Some bytes become a length, a count or a number at which code goes wrong.
-fn number(body: &mut [u8], random: &mut impl Rng) {
+pub(crate) fn number(body: &mut [u8], random: &mut impl Rng) {
     let values: [u64; 12] = [
         0,
         1,

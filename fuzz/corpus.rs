@@ -74,6 +74,11 @@ pub(crate) fn bags() -> Vec<Sample> {
     ["zstd.mcap", "two_topics.mcap"].map(|name| vec![named(&root().join("tests/ros2").join(name))]).into()
 }
 
+#[cfg(feature = "db3")]
+pub(crate) fn bags_in_sqlite() -> Vec<Sample> {
+    apart("fuzz/corpus/db3", ".db3")
+}
+
 pub(crate) fn metadata() -> Vec<Sample> {
     together("fuzz/corpus/bag")
 }

@@ -6,7 +6,9 @@ use std::path::Path;
 use rand::{Rng, RngExt};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use yair::calib::METHODS;
-use yair::dataset::{Dataset, NominalRobot, Odometry, Protocol, Run, RunInfo, TruthNoise, TruthSample, WheelLog};
+use yair::dataset::{
+    Dataset, MapDistortion, NominalRobot, Odometry, Protocol, Run, RunInfo, TruthNoise, TruthSample, WheelLog,
+};
 use yair::kinematics::Wheels;
 
 use crate::corpus::Sample;
@@ -104,7 +106,13 @@ fn dataset(random: &mut Xoshiro256PlusPlus) -> Option<Dataset> {
     let form = std::mem::discriminant(&all[0].odometry.wheels);
     all.retain(|run| std::mem::discriminant(&run.odometry.wheels) == form);
     let sigma = pick(&[None, None, Some(1e-3), Some(1e-300), Some(1e300)], random);
-    let truth_noise = TruthNoise { sigma_xy_m: sigma, sigma_theta_rad: sigma, ..TruthNoise::default() };
+    // Drawn last: numbers of executions before there were maps are what they were, but for the tenth.
+    let map = random.random_bool(0.1).then(|| MapDistortion {
+        sigma_xy_m: pick(&[1e-300, 0.02, 0.02, 1e9, 1e300], random),
+        sigma_theta_rad: pick(&[1e-300, 0.01, 0.01, 1e9, 1e300], random),
+        length_m: pick(&[1e-300, 1e-9, 2.0, 2.0, 1e300], random),
+    });
+    let truth_noise = TruthNoise { sigma_xy_m: sigma, sigma_theta_rad: sigma, map, ..TruthNoise::default() };
     let found = Dataset { robot, truth_noise, runs: all, provenance: Default::default(), points: Vec::new() };
     dataset::check_writable(&found).is_ok().then_some(found)
 }

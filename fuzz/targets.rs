@@ -39,6 +39,8 @@ pub(crate) const TARGETS: &[Target] = &[
     },
     Target { name: "censi", corpus: corpus::tuples, run: |all, random, at| import("censi", all, random, at), cost: 1 },
     Target { name: "mcap-and-cdr", corpus: corpus::bags, run: read_bag, cost: 2 },
+    #[cfg(feature = "db3")]
+    Target { name: "db3", corpus: corpus::bags_in_sqlite, run: read_bag_in_sqlite, cost: 1 },
     Target { name: "bag-metadata", corpus: corpus::metadata, run: read_metadata, cost: 1 },
     Target { name: "scenario", corpus: corpus::scenarios, run: read_scenario, cost: 1 },
     Target { name: "calibration", corpus: corpus::calibrations, run: read_calibration, cost: 1 },
@@ -174,6 +176,14 @@ fn read_bag(all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Path) -> bool 
     let (_, bytes) = &pick(all, random)[0];
     let path = at.join("a.mcap");
     fs::write(&path, bag::mutated(bytes, random)).expect("written");
+    bag_in(&path)
+}
+
+#[cfg(feature = "db3")]
+fn read_bag_in_sqlite(all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Path) -> bool {
+    let (_, bytes) = &pick(all, random)[0];
+    let path = at.join("a.db3");
+    fs::write(&path, crate::sqlite::mutated(bytes, random)).expect("written");
     bag_in(&path)
 }
 

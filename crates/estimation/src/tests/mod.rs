@@ -12,6 +12,7 @@ use crate::{Column, Model, ModelFit, Noise, Pass, Records, Selection, Thinning};
 
 mod correlated;
 mod covariance_scale;
+mod map;
 mod partial;
 mod partial_poses;
 mod path_shape;
