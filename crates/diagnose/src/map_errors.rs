@@ -2,8 +2,8 @@
 //!
 //! A map's error at a place returns in every run. The likelihood takes it for the robot's, and neither
 //! innovations nor the scatter over runs show it. Where the map's distortion is stated, its covariance of an
-//! effect's size is known ([`estimation::ModelFit::covariance`]): an effect is one if it is significant beside
-//! that. Errors that last while the robot crosses a patch of the map are the map's own.
+//! effect's size is known ([`estimation::ModelFit::covariance`]): an effect is one if it is significant
+//! beside that. Errors that last while the robot crosses a patch of the map are the map's own.
 
 use effects::CATALOGUE;
 use estimation::{Column, ModelFit, RIDGE, inverse};
@@ -12,37 +12,43 @@ use nalgebra::{DMatrix, DVector};
 use crate::augmented_model::{AugmentedModel, refit};
 use crate::candidate::{Candidate, terms};
 use crate::cause::Basis;
+use crate::document::Value;
 use crate::finding::Finding;
 use crate::settings::levels::{SCAN_LEVEL, SPARSE_TERM_LEVEL};
 use crate::statistics::p_of_chi_square;
 
 /// Leaves out what a stated distortion of the map explains: terms of `model` that are not significant beside
-/// it, and signs of errors that last.
+/// it, and signs of errors that last. Sizes of the others get the standard deviations that the map leaves.
 pub(crate) fn without_map_errors(findings: &mut Vec<Finding>, base: &ModelFit<'_>, model: &AugmentedModel<'_>) {
     if base.records.map.is_none() {
         return;
     }
-    findings.retain(|finding| {
+    findings.retain_mut(|finding| {
         let (trials, level) = match finding.basis {
             Basis::FailedTests(_) | Basis::Autocorrelated(_) => return false,
             Basis::Products(trials) => (trials, SPARSE_TERM_LEVEL),
             _ => (CATALOGUE.len(), SCAN_LEVEL),
         };
-        let candidate = finding.term.map(|term| &model.candidates[term]);
-        candidate
-            .is_none_or(|candidate| beside_map(base, candidate).is_some_and(|p_value| p_value * trials as f64 <= level))
+        let Some(candidate) = finding.term.map(|term| &model.candidates[term]) else { return true };
+        let Some((p_value, covariance)) = beside_map(base, candidate) else { return false };
+        for (k, parameter) in candidate.parameters().iter().enumerate() {
+            if let Some(Value { sigma: Some(sigma), .. }) = finding.parameters.get_mut(parameter.name) {
+                *sigma = sigma.max(covariance[(k, k)].sqrt());
+            }
+        }
+        p_value * trials as f64 <= level
     });
 }
 
-/// The p-value of a candidate by the covariance that its size has with the map's; `None` where the fit with it
-/// diverges or has none.
-fn beside_map(base: &ModelFit<'_>, candidate: &Candidate) -> Option<f64> {
+/// The p-value of a candidate by the covariance that its size has with the map's, and that covariance; `None`
+/// where the fit with it diverges or has none.
+fn beside_map(base: &ModelFit<'_>, candidate: &Candidate) -> Option<(f64, DMatrix<f64>)> {
     let model = refit(base, &AugmentedModel::base(base), vec![candidate.clone()])?;
     let covariance = model.fit.covariance(&mut terms(&model.candidates))?;
     let at: Option<Vec<usize>> = model.range(0).map(|term| model.fit.position(Column::Term(term))).collect();
     let at = at?;
     let own = DMatrix::from_fn(at.len(), at.len(), |i, j| covariance[(at[i], at[j])]);
-    Some(p_of_size(&model.estimates(0), &own))
+    Some((p_of_size(&model.estimates(0), &own), own))
 }
 
 /// The probability of an estimate as large or larger where the size is 0.
@@ -57,8 +63,8 @@ mod tests {
 
     #[test]
     fn a_size_is_judged_by_its_whole_covariance() {
-        // Two sizes of variance 1 and correlation 0.8, estimated at (2, −2): 2·4/(1 − 0.8) = 40, which has the
-        // probability e^{−20} of two degrees of freedom. Rejects variances alone: 8, e^{−4}.
+        // Two sizes of variance 1 and correlation 0.8, estimated at (2, −2): 2·4/(1 − 0.8) = 40, which has
+        // the probability e^{−20} of two degrees of freedom. Rejects variances alone: 8, e^{−4}.
         let covariance = DMatrix::from_row_slice(2, 2, &[1.0, 0.8, 0.8, 1.0]);
         let p_value = p_of_size(&DVector::from_column_slice(&[2.0, -2.0]), &covariance);
         // The ridge changes the statistic by 1e-10.
