@@ -129,8 +129,8 @@ mod tests {
 
     #[test]
     fn poses_that_share_little_are_all_taken() {
-        // Beside an instrument of 3 mm; of ticks of 0.03 mm; and beside stamps that are off by 20 ms, which at
-        // 0.2 m/s are 4 mm.
+        // Beside an instrument of 3 mm; of ticks of 0.03 mm; and beside stamps that are off by 20 ms, which
+        // at 0.2 m/s are 4 mm.
         for of in [[314.16, 3e-3, 0.0], [1e4, 3e-4, 0.0], [314.16, 3e-4, 0.01]] {
             assert_eq!(taken_s(&dataset(3.0, of)).len(), 60, "{of:?}");
         }
