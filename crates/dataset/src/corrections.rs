@@ -68,7 +68,8 @@ impl Corrections {
         }
         run.odometry.t_s.iter_mut().for_each(|t_s| *t_s *= self.time_factor);
         self.wheels(&run.odometry.t_s, &mut run.odometry.wheels);
-        let time = |t_s: f64| t_s * self.time_factor * self.truth_time_factor + self.truth_shift_s;
+        run.gyro.iter_mut().for_each(|sample| sample.t_s *= self.time_factor);
+        run.map_measurement_times(|t_s| *t_s = *t_s * self.time_factor * self.truth_time_factor + self.truth_shift_s);
         let length = |length_m: f64| length_m * self.truth_length_factor;
         let turn = |turn: f64| {
             let turn_rad = if self.heading_in_degrees { turn.to_radians() } else { turn };
@@ -81,7 +82,7 @@ impl Corrections {
         };
         for sample in &mut run.truth {
             let (x_m, y_m) = place(sample.x_m, sample.y_m);
-            *sample = TruthSample::new(time(sample.t_s), x_m, y_m, sample.theta_rad().map(turn));
+            *sample = TruthSample::new(sample.t_s, x_m, y_m, sample.theta_rad().map(turn));
         }
         // Errors go the way of what they are errors of.
         let [of_x, of_y] = [place(1.0, 0.0), place(0.0, 1.0)];
@@ -93,36 +94,28 @@ impl Corrections {
         }
         for heading in &mut run.headings {
             let [theta_rad, sigma_rad] = [turn(heading.theta_rad), turn(heading.sigma_rad).abs()];
-            *heading = HeadingReading { t_s: time(heading.t_s), theta_rad, sigma_rad };
+            *heading = HeadingReading { theta_rad, sigma_rad, ..*heading };
         }
-        run.gyro.iter_mut().for_each(|sample| sample.t_s *= self.time_factor);
         for displacement in &mut run.displacements {
-            (displacement.t0_s, displacement.t1_s) = (time(displacement.t0_s), time(displacement.t1_s));
             (displacement.dx_m, displacement.dy_m) = place(displacement.dx_m, displacement.dy_m);
             displacement.dtheta_rad = turn(displacement.dtheta_rad);
         }
         for reading in &mut run.point_readings {
-            reading.t_s = time(reading.t_s);
             (reading.room.x_m, reading.room.y_m) = place(reading.room.x_m, reading.room.y_m);
         }
-        run.wheel_reference.iter_mut().for_each(|speed| speed.t_s = time(speed.t_s));
         self.partial(run);
     }
 
-    /// What a tape or a wall says is of the robot and no frame: times and lengths are corrected alone.
+    /// What a tape or a wall says is of the robot and no frame: lengths are corrected alone.
     fn partial(&self, run: &mut Run) {
-        let time = |t_s: &mut f64| *t_s = *t_s * self.time_factor * self.truth_time_factor + self.truth_shift_s;
         let length = |length_m: &mut f64| *length_m *= self.truth_length_factor;
         for of in &mut run.revisits {
-            [&mut of.t0_s, &mut of.t1_s].into_iter().for_each(time);
             [&mut of.dx_m, &mut of.dy_m].into_iter().flatten().for_each(length);
         }
         for of in &mut run.distances {
-            [&mut of.t0_s, &mut of.t1_s].into_iter().for_each(time);
             length(&mut of.distance_m);
         }
         for of in &mut run.walls {
-            time(&mut of.t_s);
             of.distance_m.iter_mut().for_each(length);
         }
     }

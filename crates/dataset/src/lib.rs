@@ -17,6 +17,7 @@ pub mod import;
 mod imported;
 mod interval_means;
 mod map_distortion;
+mod measurement_times;
 mod name_units;
 mod partial;
 mod pose_covariance;

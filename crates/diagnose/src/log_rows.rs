@@ -19,12 +19,8 @@ use crate::settings::records::{
 /// spans.
 pub(crate) fn check_spans(datasets: &[Dataset]) -> Option<TestResult> {
     let ratio = |run: &Run| {
-        let ends = run.displacements.iter().flat_map(|displacement| [displacement.t0_s, displacement.t1_s]);
-        let measured_s = run.truth.iter().map(|measurement| measurement.t_s).chain(ends);
-        let (first_s, last_s) =
-            measured_s.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t_s| (a.min(t_s), b.max(t_s)));
-        let logged_s = run.odometry.t_s.last()? - run.odometry.t_s.first()?;
-        (logged_s > 0.0 && last_s > first_s).then(|| logged_s / (last_s - first_s))
+        let ([first_s, last_s], logged_s) = run.measured_span_s().zip(run.logged_span_s())?;
+        (logged_s > 0.0).then(|| logged_s / (last_s - first_s))
     };
     let mut ratios: Vec<f64> = datasets.iter().flat_map(|dataset| &dataset.runs).filter_map(ratio).collect();
     ratios.sort_by(f64::total_cmp);

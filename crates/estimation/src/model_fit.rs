@@ -362,8 +362,9 @@ impl ModelFit<'_> {
         }
         let clusters = units.iter().map(|unit| unit.of(&self.columns).along(&free));
         let mut robust = ClusterRobust::of(&inverse, clusters).covariance;
-        if let Some((sigma, scale)) = self.records.gyro_scale_sigma.zip(self.position(Column::GyroScale)) {
-            // What was stated of the scale did not come from the runs, and does not scatter over them.
+        if let Some(scale) = self.position(Column::GyroScale) {
+            let sigma = self.records.gyro_scale_prior_sigma();
+            // What is known of the scale did not come from the runs, and does not scatter over them.
             let by_scale = &inverse * free.row(scale).transpose() / sigma;
             robust += &by_scale * by_scale.transpose();
         }

@@ -218,7 +218,6 @@ struct Window {
     to_s: f64,
     turn_rad: f64,
     stands: bool,
-    rows: usize,
 }
 
 impl GyroSettings {
@@ -247,8 +246,8 @@ impl GyroSettings {
     }
 }
 
-/// The rows of a gyroscope in windows of a length, cut where the wheels begin or cease to turn, and where
-/// rows are without a rate.
+/// The rows of a gyroscope in windows of a length, cut where rows are without a rate: counts that are spoiled
+/// and the same put right give the same measurements.
 fn windows(run: &Run, track: &WheelAngleInterpolator<'_>, is_instantaneous: bool, longest_s: f64) -> Vec<Window> {
     let Some(rates) = run.gyro_rates() else { return Vec::new() };
     // Rates by their own instants have become means over the rows.
@@ -264,16 +263,12 @@ fn windows(run: &Run, track: &WheelAngleInterpolator<'_>, is_instantaneous: bool
         let stands = turns.left[row] == turns.left[row - 1] && turns.right[row] == turns.right[row - 1];
         let turn_rad = rate * (to_s - from_s);
         match windows.last_mut() {
-            Some(last)
-                if last.to_s == from_s
-                    && last.stands == stands
-                    && to_s - last.from_s <= longest_s + TIME_TOLERANCE_S =>
-            {
+            Some(last) if last.to_s == from_s && to_s - last.from_s <= longest_s + TIME_TOLERANCE_S => {
                 last.to_s = to_s;
                 last.turn_rad += turn_rad;
-                last.rows += 1;
+                last.stands &= stands;
             }
-            _ => windows.push(Window { from_s, to_s, turn_rad, stands, rows: 1 }),
+            _ => windows.push(Window { from_s, to_s, turn_rad, stands }),
         }
     }
     windows

@@ -268,7 +268,7 @@ fn add_partial(
     terms: &[Box<dyn ModelTerm>],
 ) -> Vec<(usize, usize)> {
     let columns = Column::BASE.len() + terms.iter().map(|term| term.parameters().len()).sum::<usize>();
-    let mut prior = records.gyro_scale_sigma.map(|sigma| sigma.powi(-2));
+    let mut prior = Some(records.gyro_scale_prior_sigma().powi(-2));
     let filtered = |gate: OutlierGate| -> Vec<Option<Filtered>> {
         let of_segment = |terms: &mut Vec<Box<dyn ModelTerm>>,
                           of: (&PartialSegment<'_>, &Option<Vec<PropagationInterval>>)| {

@@ -16,6 +16,7 @@ use crate::noise_shape::NoiseShape;
 use crate::partial_records::{GyroSettings, PartialSegment, partial_segments};
 use crate::poses_between_rows::take_one_for_each_row;
 use crate::segment::{MeasuredPose, Segment, Start};
+use crate::settings::GYRO_SCALE_SIGMA;
 use crate::settings::{AUTOCORRELATION_DECAY, MIN_CHORD_RATIO, TIME_TOLERANCE_S};
 use crate::wheel_angles::{WheelAngleInterpolator, WheelInterval};
 
@@ -116,6 +117,11 @@ impl<'a> Records<'a> {
     #[must_use]
     pub fn has_gyro(&self) -> bool {
         self.partial.iter().any(PartialSegment::has_gyro)
+    }
+
+    /// Standard deviation of the gyroscope's relative scale, before it is seen.
+    pub(crate) fn gyro_scale_prior_sigma(&self) -> f64 {
+        self.gyro_scale_sigma.unwrap_or(GYRO_SCALE_SIGMA)
     }
 
     /// Is the scale of the gyroscope stated?

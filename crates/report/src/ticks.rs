@@ -16,6 +16,10 @@ const PLAIN: std::ops::RangeInclusive<i32> = -3..=4;
 /// More ticks fit on no axis.
 const MAX_TICKS: i64 = 200;
 
+/// Powers of ten between which steps begin: a span of the smallest or largest doubles has a quotient by
+/// `MAX_TICKS`, or a length, that is 0 or infinite.
+const FIRST_EXPONENTS: [f64; 2] = [-300.0, 300.0];
+
 /// The densest ticks of which neighbouring labels `fit`: it is asked with two labels and the distance between
 /// them as a part of the axis.
 pub(crate) fn ticks(span: &Span, fit: &dyn Fn(&str, &str, f64) -> bool) -> Vec<Tick> {
@@ -34,7 +38,8 @@ fn all_fit(span: &Span, ticks: &[Tick], fit: &dyn Fn(&str, &str, f64) -> bool) -
 }
 
 fn linear_ticks(span: &Span, fit: &dyn Fn(&str, &str, f64) -> bool) -> Vec<Tick> {
-    let mut exponent = (span.length() / MAX_TICKS as f64).log10().floor() as i32;
+    let [least, most] = FIRST_EXPONENTS;
+    let mut exponent = (span.length() / MAX_TICKS as f64).log10().floor().clamp(least, most) as i32;
     let mut best = Vec::new();
     loop {
         for digit in [1_i64, 2, 5] {
@@ -68,7 +73,7 @@ fn multiples(span: &Span, digit: i64, exponent: i32) -> Option<Vec<Tick>> {
     // An end that is a multiple up to rounding is one.
     let slack = 1e-9 * span.length() / step;
     let (first, last) = ((span.low / step - slack).ceil() as i64, (span.high / step + slack).floor() as i64);
-    if last - first > MAX_TICKS {
+    if last.saturating_sub(first) > MAX_TICKS {
         return None;
     }
     let numbers: Vec<i64> = (first..=last).map(|k| k * digit).collect();
@@ -176,5 +181,12 @@ mod tests {
         assert_eq!(labels(0.0, 1.0, Scale::Linear, 9.0), ["0", "1"]);
         assert_eq!(labels(0.0, 4.5, Scale::Linear, 9.0), ["0", "4"]);
         assert!(labels(0.0, 1e100, Scale::Linear, 0.2).len() >= 2 && labels(0.0, 1e-99, Scale::Linear, 0.2).len() >= 2);
+    }
+
+    #[test]
+    fn spans_of_the_smallest_and_largest_doubles_end() {
+        assert_eq!(labels(0.0, 5e-324, Scale::Linear, 0.2), ["0"]);
+        assert_eq!(labels(0.0, f64::MAX, Scale::Linear, 0.2), ["0", "0.5×10³⁰⁸", "1.0×10³⁰⁸", "1.5×10³⁰⁸"]);
+        assert!(labels(-f64::MAX, f64::MAX, Scale::Linear, 0.2).len() <= 1, "its length is infinite");
     }
 }

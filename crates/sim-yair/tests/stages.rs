@@ -157,6 +157,43 @@ fn a_skewed_clock_reads_the_right_counter_later() {
     }
 }
 
+/// A floor that turns at 0.5 rad/s under a robot whose rows are read, and truly stamped, at odd times.
+struct OddRowsOnATurntable;
+
+impl Forward for OddRowsOnATurntable {
+    fn floor(&mut self, step: &mut Step) {
+        step.extra_turn_rad += 0.5 * step.dt_s;
+    }
+
+    fn clock(&mut self, sample: &mut SampleClock) {
+        let off_s = 0.02 * (7.0 * sample.stamp_s).sin();
+        sample.stamp_s += off_s;
+        sample.read_s = sample.read_s.map(|read_s| read_s + off_s);
+    }
+}
+
+#[test]
+fn a_gyroscope_has_the_mean_rate_from_row_to_row_however_long_rows_are() {
+    for engine in ENGINES {
+        let mut scenario = scenario(engine);
+        scenario.instruments = vec![Instrument::Gyro {
+            noise_rad_per_sqrt_s: 0.0,
+            bias_radps: 0.0,
+            bias_walk_radps_per_sqrt_s: 0.0,
+            scale: 0.0,
+            scale_sigma: 0.0,
+            still_s: 0.0,
+        }];
+        let (run, _) = drive(&scenario, Some(Box::new(OddRowsOnATurntable)));
+        let rates = run.gyro_rates().expect("a gyroscope");
+        let lengths_s: Vec<f64> = run.odometry.t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        assert!(lengths_s.iter().any(|s| *s < 0.09) && lengths_s.iter().any(|s| *s > 0.11), "{lengths_s:?}");
+        // The servo straightens out what a count is between the wheels: 0.1 mrad of an interval's 50.
+        let worst = rates[2..].iter().map(|rate| (rate - 0.5).abs()).fold(0.0, f64::max);
+        assert!(worst < 2e-3, "{engine:?}: {worst}");
+    }
+}
+
 #[test]
 fn motion_capture_looks_at_its_rate_stamps_late_and_rides_its_lever() {
     for engine in ENGINES {

@@ -78,21 +78,11 @@ impl Forward for State {
     }
 }
 
-/// The instants of all that was measured from outside.
-fn measured_s(run: &Run) -> impl Iterator<Item = f64> {
-    let ends = run.displacements.iter().flat_map(|displacement| [displacement.t0_s, displacement.t1_s]);
-    let poses = run.truth.iter().map(|sample| sample.t_s);
-    let points = run.point_readings.iter().map(|reading| reading.t_s);
-    poses.chain(points).chain(ends).chain(run.wheel_reference.iter().map(|speed| speed.t_s))
-}
-
 /// The log's span over that of the measurements, by the middle run.
 fn span_ratio(dataset: &Dataset) -> Option<f64> {
     let ratio = |run: &Run| {
-        let logged_s = run.odometry.t_s.last()? - run.odometry.t_s.first()?;
-        let (first_s, last_s) =
-            measured_s(run).fold((f64::INFINITY, f64::NEG_INFINITY), |(first, last), t_s| (first.min(t_s), last.max(t_s)));
-        (logged_s > 0.0 && last_s > first_s).then(|| logged_s / (last_s - first_s))
+        let ([first_s, last_s], logged_s) = run.measured_span_s().zip(run.logged_span_s())?;
+        (logged_s > 0.0).then(|| logged_s / (last_s - first_s))
     };
     median(dataset.runs.iter().filter_map(ratio).collect())
 }
@@ -134,15 +124,10 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
     let (mut log, mut measurements) = (dataset.clone(), dataset.clone());
     for run in &mut log.runs {
         run.odometry.t_s.iter_mut().for_each(|t_s| *t_s /= factor);
+        run.gyro.iter_mut().for_each(|of| of.t_s /= factor);
     }
     for run in &mut measurements.runs {
-        run.truth.iter_mut().for_each(|sample| sample.t_s *= factor);
-        run.point_readings.iter_mut().for_each(|reading| reading.t_s *= factor);
-        run.wheel_reference.iter_mut().for_each(|speed| speed.t_s *= factor);
-        for displacement in &mut run.displacements {
-            displacement.t0_s *= factor;
-            displacement.t1_s *= factor;
-        }
+        run.map_measurement_times(|t_s| *t_s *= factor);
     }
     let mut forms = [(log, factor, "the log's"), (measurements, factor.recip(), "the instrument's")];
     // Which of the two is in seconds, the ratio does not say; the speed does.

@@ -9,6 +9,12 @@ pub(crate) const GYRO_WINDOW_S: f64 = 1.0;
 /// Budgeted: beyond what any robot turns at, so that the bias counts as unknown however many runs there are.
 pub(crate) const GYRO_BIAS_SIGMA_RADPS: f64 = 10.0;
 
+/// Standard deviation of a gyroscope's relative scale of which nothing is stated: one that turns the other way
+/// is a fault of wheels or mounting, and none of scale.
+/// Budgeted: twice the tenth that data sheets allow consumer sensors, and far too loose to determine a
+/// wheelbase.
+pub(crate) const GYRO_SCALE_SIGMA: f64 = 0.2;
+
 /// Random walk of a gyroscope's bias that nothing is stated of, rad/s per √s.
 /// Convention: a bias that strays by 0.01 °/s in a minute, as those of consumer sensors do.
 pub(crate) const BIAS_WALK_RADPS: f64 = 2e-5;

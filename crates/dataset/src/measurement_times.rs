@@ -1,0 +1,86 @@
+//! The instants of all that was measured from outside, whatever the kind.
+
+use crate::record::Run;
+
+impl Run {
+    /// Changes each instant of what was measured from outside. A gyroscope's are none of them: it rides on the
+    /// robot.
+    pub fn map_measurement_times(&mut self, mut map: impl FnMut(&mut f64)) {
+        self.truth.iter_mut().for_each(|of| map(&mut of.t_s));
+        self.headings.iter_mut().for_each(|of| map(&mut of.t_s));
+        self.point_readings.iter_mut().for_each(|of| map(&mut of.t_s));
+        self.wheel_reference.iter_mut().for_each(|of| map(&mut of.t_s));
+        self.walls.iter_mut().for_each(|of| map(&mut of.t_s));
+        self.displacements.iter_mut().flat_map(|of| [&mut of.t0_s, &mut of.t1_s]).for_each(&mut map);
+        self.revisits.iter_mut().flat_map(|of| [&mut of.t0_s, &mut of.t1_s]).for_each(&mut map);
+        self.distances.iter_mut().flat_map(|of| [&mut of.t0_s, &mut of.t1_s]).for_each(&mut map);
+    }
+
+    /// First and last instant of what was measured from outside, seconds from the run's start; `None` where
+    /// nothing was, or at one instant alone.
+    #[must_use]
+    pub fn measured_span_s(&self) -> Option<[f64; 2]> {
+        let at = self.truth.iter().map(|of| of.t_s).chain(self.headings.iter().map(|of| of.t_s));
+        let at = at.chain(self.point_readings.iter().map(|of| of.t_s)).chain(self.walls.iter().map(|of| of.t_s));
+        let at = at.chain(self.wheel_reference.iter().map(|of| of.t_s));
+        let ends = self.displacements.iter().flat_map(|of| [of.t0_s, of.t1_s]);
+        let ends = ends.chain(self.revisits.iter().flat_map(|of| [of.t0_s, of.t1_s]));
+        let ends = ends.chain(self.distances.iter().flat_map(|of| [of.t0_s, of.t1_s]));
+        let span = at.chain(ends).fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], t_s| [a.min(t_s), b.max(t_s)]);
+        (span[1] > span[0]).then_some(span)
+    }
+
+    /// From the log's first row to its last, seconds; `None` with fewer than two rows.
+    #[must_use]
+    pub fn logged_span_s(&self) -> Option<f64> {
+        let t_s = &self.odometry.t_s;
+        (t_s.len() > 1).then(|| t_s[t_s.len() - 1] - t_s[0])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::partial::{HeadingReading, Revisit, TapeDistance, WallReading};
+    use crate::record::{Displacement, TruthSample};
+
+    #[test]
+    fn each_kind_of_measurement_has_a_span_and_is_shifted() {
+        let [t0_s, t1_s] = [1.0, 3.0];
+        let wall = |t_s| WallReading {
+            t_s,
+            wall: "north".to_owned(),
+            distance_m: Some(1.0),
+            heading_rad: None,
+            sigma_m: Some(0.01),
+            sigma_rad: None,
+        };
+        let heading = |t_s| HeadingReading { t_s, theta_rad: 0.0, sigma_rad: 0.01 };
+        let revisit = Revisit {
+            t0_s,
+            t1_s,
+            dx_m: None,
+            dy_m: None,
+            dtheta_rad: Some(0.0),
+            sigma_xy_m: None,
+            sigma_theta_rad: Some(0.01),
+        };
+        let pose = |t_s| TruthSample::new(t_s, 0.0, 0.0, None);
+        let displacement = Displacement { t0_s, t1_s, dx_m: 1.0, dy_m: 0.0, dtheta_rad: 0.0 };
+        let each = [
+            Run { truth: vec![pose(t0_s), pose(t1_s)], ..Run::default() },
+            Run { headings: vec![heading(t1_s), heading(t0_s)], ..Run::default() },
+            Run { walls: vec![wall(t0_s), wall(t1_s)], ..Run::default() },
+            Run { displacements: vec![displacement], ..Run::default() },
+            Run { revisits: vec![revisit], ..Run::default() },
+            Run { distances: vec![TapeDistance { t0_s, t1_s, distance_m: 1.0, sigma_m: 0.01 }], ..Run::default() },
+        ];
+        for mut run in each {
+            assert_eq!(run.measured_span_s(), Some([1.0, 3.0]), "{run:?}");
+            run.map_measurement_times(|t_s| *t_s = 10.0 * *t_s + 1.0);
+            assert_eq!(run.measured_span_s(), Some([11.0, 31.0]), "{run:?}");
+        }
+        assert_eq!(Run::default().measured_span_s(), None);
+        assert_eq!(Run { truth: vec![pose(1.0)], ..Run::default() }.measured_span_s(), None, "one instant");
+    }
+}
