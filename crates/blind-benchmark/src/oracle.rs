@@ -260,6 +260,14 @@ impl Detectability {
         let columns: Vec<Column> = Column::GEOMETRY.into_iter().chain(has_gyro.then_some(Column::GyroScale)).collect();
         let free: Vec<usize> = columns.iter().map(|column| column.index()).collect();
         let mut model = Model::of(truth, at - Column::BASE.len());
+        if has_gyro {
+            // Its scale and how wrong it is are no signature of the effect's.
+            for _ in 0..GAUSS_NEWTON_STEPS {
+                let plain = measurement(without, &model, noise, &mut terms)?;
+                let step = to_best_geometry(&plain.total, &[Column::GyroScale.index()])?;
+                model.advance(Column::GyroScale, step[0]);
+            }
+        }
         let plain = measurement(without, &model, noise, &mut terms)?;
         let mut at_truth = None;
         let mut measured = measurement(datasets, &model, noise, &mut terms)?;
