@@ -21,7 +21,7 @@ use crate::noise_score::NoiseScore;
 use crate::normal_equations::NormalEquations;
 use crate::partial_noise::{NoiseDerivatives, OF_MOTION};
 use crate::partial_observation::{Observation, Place, Quantity};
-use crate::partial_poses::{PoseUpdate, TakenPoses, Taking};
+use crate::partial_poses::{PoseUpdate, TakenPoses, Taking, instrument_by_terms};
 use crate::partial_records::PartialSegment;
 use crate::pass_options::OutlierGate;
 use crate::products::{Products, Sums};
@@ -150,7 +150,15 @@ pub(crate) fn filter_taken(
                         filter.update_pose(&of, columns, &mut sums);
                     }
                 }
-                _ => filter.update_gated((at, of), gate, model, columns, &mut sums),
+                quantity => {
+                    let by_terms = if quantity.is_of_an_instant() {
+                        let pose = filter.pose_at(filter.at_place(number));
+                        instrument_by_terms((segment, number), pose, of.t_s, &mut propagator)
+                    } else {
+                        Vec::new()
+                    };
+                    filter.update_gated((at, of, &by_terms), gate, model, columns, &mut sums);
+                }
             }
             filter.forget(at);
         }
@@ -167,7 +175,7 @@ impl<'f> PartialFilter<'f> {
             last_use[of.from] = Some(number);
             last_use[of.to] = Some(number);
         }
-        let slots = most_at_once(segment, &last_use);
+        let slots = segment.most_places_at_once(&last_use);
         let first_slot = first_slot(&segment.walls);
         let size = first_slot + 3 * slots;
         let (mut state, mut covariance) = (DVector::zeros(size), DMatrix::zeros(size, size));
@@ -388,7 +396,7 @@ impl<'f> PartialFilter<'f> {
     /// not where the filter has it, which starts anew there.
     fn update_gated(
         &mut self,
-        (number, of): (usize, &Observation),
+        (number, of, by_terms): (usize, &Observation, &[Vector3<f64>]),
         gate: OutlierGate,
         model: &Model,
         columns: usize,
@@ -399,13 +407,13 @@ impl<'f> PartialFilter<'f> {
             Quantity::WallDistance(_) => Some(1),
             _ => None,
         };
-        let mut is_taken = self.update(of, gate, model, columns, sums);
+        let mut is_taken = self.update((of, by_terms), gate, model, columns, sums);
         if let Some(in_a_row) = kind.map(|kind| &mut self.wall_outliers_in_a_row[kind]) {
             *in_a_row = if is_taken { 0 } else { *in_a_row + 1 };
             if *in_a_row >= RESTART_AFTER_OUTLIERS {
                 *in_a_row = 0;
                 self.start_anew(of.to);
-                is_taken = self.update(of, gate, model, columns, sums);
+                is_taken = self.update((of, by_terms), gate, model, columns, sums);
             }
         }
         if !is_taken {
@@ -413,10 +421,10 @@ impl<'f> PartialFilter<'f> {
         }
     }
 
-    /// Takes an observation; says whether it passes the gate.
+    /// Takes an observation, to whose pose terms add `by_terms`; says whether it passes the gate.
     fn update(
         &mut self,
-        of: &Observation,
+        (of, by_terms): (&Observation, &[Vector3<f64>]),
         gate: OutlierGate,
         model: &Model,
         columns: usize,
@@ -425,7 +433,11 @@ impl<'f> PartialFilter<'f> {
         if let Quantity::GyroTurn { dt_s } = of.quantity {
             self.covariance[(bias_at(), bias_at())] += self.segment.bias_walk * dt_s;
         }
-        let (v, row) = self.predicted(of, model);
+        let (mut v, row) = self.predicted(of, model);
+        let at = self.at_place(of.to);
+        let by_terms: Vec<f64> =
+            by_terms.iter().map(|by| row[at] * by.x + row[at + 1] * by.y + row[at + 2] * by.z).collect();
+        v -= by_terms.iter().zip(&model.term_values).map(|(by, size)| by * size).sum::<f64>();
         let ph = &self.covariance * &row;
         let s = row.dot(&ph) + of.variance;
         if gate == OutlierGate::On && v * v > PARTIAL_OUTLIER_CHI_SQUARE * s {
@@ -438,6 +450,7 @@ impl<'f> PartialFilter<'f> {
             let turn_rad = self.state[self.at_place(of.to) + 2] - self.state[self.at_place(of.from) + 2];
             j[Column::GyroScale.index()] -= turn_rad;
         }
+        j[Column::BASE.len()..].iter_mut().zip(by_terms).for_each(|(of, by)| *of -= by);
         j.resize(columns + 1, 0.0);
         sums.add([&j], [v], [s]);
         self.noise_by.take_scalar(&row, &gain, v, s);
@@ -479,18 +492,4 @@ impl<'f> PartialFilter<'f> {
         self.covariance -= &gain * ph.transpose();
         self.by += &gain * by;
     }
-}
-
-/// How many places are needed at once.
-fn most_at_once(segment: &PartialSegment<'_>, last_use: &[Option<usize>]) -> usize {
-    let mut observations = segment.observations.iter().enumerate().peekable();
-    let (mut needed, mut most) = (Vec::new(), 1);
-    for (number, last_use) in last_use.iter().enumerate() {
-        needed.extend(*last_use);
-        most = most.max(needed.len());
-        while let Some((at, _)) = observations.next_if(|(_, of)| of.to == number) {
-            needed.retain(|last_use| *last_use > at);
-        }
-    }
-    most
 }

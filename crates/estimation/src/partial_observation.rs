@@ -31,12 +31,22 @@ pub(crate) enum Quantity {
     MeasuredPose { segment: usize, measurement: usize },
 }
 
+impl Quantity {
+    /// Does an instrument see it from where the robot is at one instant? What an effect adds to the poses of
+    /// such an instrument it adds to this.
+    pub(crate) const fn is_of_an_instant(self) -> bool {
+        matches!(self, Self::WallDistance(_) | Self::WallHeading(_))
+    }
+}
+
 /// A scalar that was measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Observation {
     /// Indices of its places; equal where it is of one instant, or the robot stood.
     pub(crate) from: usize,
     pub(crate) to: usize,
+    /// When it was, or ended, seconds from the run's start.
+    pub(crate) t_s: f64,
     pub(crate) quantity: Quantity,
     pub(crate) value: f64,
     pub(crate) variance: f64,

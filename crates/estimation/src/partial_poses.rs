@@ -121,9 +121,7 @@ impl PoseUpdate {
             Vector3::new(cos * ahead - turning * mounted.y, sin * ahead + turning * mounted.x, turning)
         };
         let (moved, by_latency) = (velocity(0.5 * latency_s), velocity(latency_s));
-        let twist = propagator.twist(segment.rate_at(after, measured.t_s));
-        propagator.measurement(pose, place, measured.t_s, twist);
-        let by_terms: Vec<Vector3<f64>> = propagator.gradients.iter().map(|of| room(*of)).collect();
+        let by_terms = instrument_by_terms((partial, place), pose, measured.t_s, propagator);
         let of_terms: Vector3<f64> = model.term_values.iter().zip(&by_terms).map(|(size, by)| *by * *size).sum();
         let ahead = mounted - moved * latency_s + of_terms;
         let expected = Vector3::new(pose.x_m, pose.y_m, pose.theta_rad) + ahead;
@@ -158,4 +156,20 @@ impl PoseUpdate {
         }
         Self { by_state, direct, innovation, errors, errors_by, components: if has_heading { 3 } else { 2 } }
     }
+}
+
+/// What terms of unit size add to what an instrument sees of the robot's pose, at an instant and a place of a
+/// segment where the drive's centre stands at `pose`, in the room. What they add comes from their state in
+/// force.
+pub(crate) fn instrument_by_terms(
+    (partial, place): (&PartialSegment<'_>, usize),
+    pose: Pose,
+    t_s: f64,
+    propagator: &mut Propagator<'_, '_>,
+) -> Vec<Vector3<f64>> {
+    let (sin, cos) = sin_cos(pose.theta_rad);
+    let room = |of: &Pose| Vector3::new(cos * of.x_m - sin * of.y_m, sin * of.x_m + cos * of.y_m, of.theta_rad);
+    let twist = propagator.twist(partial.segment.rate_at(partial.places[place].after, t_s));
+    propagator.measurement(pose, place, t_s, twist);
+    propagator.gradients.iter().map(room).collect()
 }

@@ -43,6 +43,20 @@ impl PartialSegment<'_> {
         self.observations.iter().filter(|of| !matches!(of.quantity, Quantity::MeasuredPose { .. })).count()
     }
 
+    /// How many places are needed at once, each until the last observation that is of it.
+    pub(crate) fn most_places_at_once(&self, last_use: &[Option<usize>]) -> usize {
+        let mut observations = self.observations.iter().enumerate().peekable();
+        let (mut needed, mut most) = (Vec::new(), 1);
+        for (number, last_use) in last_use.iter().enumerate() {
+            needed.extend(*last_use);
+            most = most.max(needed.len());
+            while let Some((at, _)) = observations.next_if(|(_, of)| of.to == number) {
+                needed.retain(|last_use| *last_use > at);
+            }
+        }
+        most
+    }
+
     /// Does a gyroscope measure in it?
     pub(crate) fn has_gyro(&self) -> bool {
         self.observations.iter().any(|of| matches!(of.quantity, Quantity::GyroTurn { .. }))
@@ -131,7 +145,8 @@ pub(crate) fn partial_segments<'a>(
             .iter()
             .filter_map(|of| {
                 let (from, to) = (place_at(of.from_s)?, place_at(of.to_s)?);
-                Some(Observation { from, to, quantity: of.quantity, value: of.value, variance: of.variance })
+                let Timed { to_s: t_s, quantity, value, variance, .. } = *of;
+                Some(Observation { from, to, t_s, quantity, value, variance })
             })
             .collect();
         // Between equals the order of the files.

@@ -205,6 +205,30 @@ fn gradients_are_those_of_the_cost() {
 }
 
 #[test]
+fn what_an_effect_adds_to_the_poses_of_an_instrument_it_adds_to_walls() {
+    let dataset = dataset(NO_GYRO, |run, poses| {
+        for row in (0..=280).step_by(20) {
+            wall(run, poses, row, [true, true], 0.3 * (row as f64).sin());
+        }
+    });
+    let records = Records::of(&[dataset.session()]);
+    let selections = Selection::of(&records, Thinning::NONE, &nominal());
+    let options = PassOptions { gate: OutlierGate::Off, ..PassOptions::default() };
+    let with = |ahead_s: f64| {
+        let mut model = Model { term_values: vec![0.0, ahead_s], ..nominal() };
+        (model.m_per_rad, model.separation_m) = (M_PER_RAD, SEPARATION_M);
+        let found = pass(&records, &selections, &model, &noise(), &[], &mut [Box::new(super::TravelTerm)], options);
+        total(&found.runs).expect("runs")
+    };
+    let step = 1e-6;
+    let ahead = Column::Term(1).index();
+    let numeric = (with(step).cost() - with(-step).cost()) / (2.0 * step);
+    let [analytic, information] = [with(0.0).gradient[ahead], with(0.0).information[(ahead, ahead)]];
+    assert!(information.sqrt() > 1.0, "no wall shows where the robot is ahead of: {information}");
+    assert!((numeric - analytic).abs() < 0.02 * information.sqrt(), "{numeric} {analytic} of {}", information.sqrt());
+}
+
+#[test]
 fn the_score_of_the_noise_is_that_of_the_cost() {
     let dataset = dataset(GYRO, all);
     let (mut model, noise) = (nominal(), noise());
