@@ -1,6 +1,7 @@
 //! The instants of all that was measured from outside, whatever the kind.
 
 use crate::record::Run;
+use crate::settings::MAX_ROW_S;
 
 impl Run {
     /// Changes each instant of what was measured from outside. A gyroscope's are none of them: it rides on the
@@ -30,11 +31,21 @@ impl Run {
         (span[1] > span[0]).then_some(span)
     }
 
-    /// From the log's first row to its last, seconds; `None` with fewer than two rows.
+    /// The log's span and that of what was measured from outside, seconds, where both are meant to be of the
+    /// same time. Tapes, walls and marks may be of a part of a run: where they lie within a log of plausible
+    /// rows, it is `None`.
     #[must_use]
-    pub fn logged_span_s(&self) -> Option<f64> {
-        let t_s = &self.odometry.t_s;
-        (t_s.len() > 1).then(|| t_s[t_s.len() - 1] - t_s[0])
+    pub fn spans_s(&self) -> Option<[f64; 2]> {
+        let (first_s, last_s) = (*self.odometry.t_s.first()?, *self.odometry.t_s.last()?);
+        let [from_s, to_s] = self.measured_span_s()?;
+        let logged_s = last_s - first_s;
+        let is_followed = !(self.truth.is_empty()
+            && self.displacements.is_empty()
+            && self.point_readings.is_empty()
+            && self.wheel_reference.is_empty());
+        let is_plausible = logged_s <= MAX_ROW_S * (self.odometry.t_s.len() - 1) as f64;
+        let is_within = from_s >= first_s - logged_s && to_s <= last_s + logged_s;
+        (logged_s > 0.0 && (is_followed || !is_plausible || !is_within)).then_some([logged_s, to_s - from_s])
     }
 }
 
@@ -42,7 +53,7 @@ impl Run {
 mod tests {
     use super::*;
     use crate::partial::{HeadingReading, Revisit, TapeDistance, WallReading};
-    use crate::record::{Displacement, TruthSample};
+    use crate::record::{Displacement, Odometry, TruthSample};
 
     #[test]
     fn each_kind_of_measurement_has_a_span_and_is_shifted() {
@@ -82,5 +93,24 @@ mod tests {
         }
         assert_eq!(Run::default().measured_span_s(), None);
         assert_eq!(Run { truth: vec![pose(1.0)], ..Run::default() }.measured_span_s(), None, "one instant");
+    }
+
+    #[test]
+    fn a_tape_over_a_part_of_a_run_is_no_clock_of_its_own() {
+        let log =
+            |row_s: f64| Odometry { t_s: (0..=2000).map(|k| row_s * f64::from(k)).collect(), ..Odometry::default() };
+        let tape = |t1_s: f64| TapeDistance { t0_s: 0.0, t1_s, distance_m: 1.0, sigma_m: 0.01 };
+        let spans = |row_s: f64, t1_s: f64| {
+            Run { odometry: log(row_s), distances: vec![tape(t1_s)], ..Run::default() }.spans_s()
+        };
+        assert_eq!(spans(0.5, 1.0), None, "a second of a thousand");
+        assert_eq!(spans(0.5, 1e6), Some([1000.0, 1e6]), "far beyond the log");
+        assert_eq!(spans(500.0, 1000.0), Some([1e6, 1000.0]), "rows of eight minutes");
+        let followed = Run {
+            odometry: log(0.5),
+            truth: vec![TruthSample::new(0.0, 0.0, 0.0, None), TruthSample::new(1.0, 0.0, 0.0, None)],
+            ..Run::default()
+        };
+        assert_eq!(followed.spans_s(), Some([1000.0, 1.0]), "poses follow all of it");
     }
 }

@@ -35,3 +35,7 @@ pub(crate) const SHOWN_CHARS: usize = 60;
 /// a distance is a length: calibrated so, wheels had biases of 0.07 % and intervals that covered 65 %.
 /// Budgeted: the lever of the lidar swings by nearly its own length.
 pub const MIN_LIDAR_TURN_RAD: f64 = 1.0;
+
+/// Seconds. Rows that lie farther apart on average are not stamped in seconds.
+/// Convention: wheels are logged at 1 Hz or more.
+pub const MAX_ROW_S: f64 = 4.0;

@@ -19,8 +19,8 @@ use crate::settings::records::{
 /// spans.
 pub(crate) fn check_spans(datasets: &[Dataset]) -> Option<TestResult> {
     let ratio = |run: &Run| {
-        let ([first_s, last_s], logged_s) = run.measured_span_s().zip(run.logged_span_s())?;
-        (logged_s > 0.0).then(|| logged_s / (last_s - first_s))
+        let [logged_s, measured_s] = run.spans_s()?;
+        Some(logged_s / measured_s)
     };
     let mut ratios: Vec<f64> = datasets.iter().flat_map(|dataset| &dataset.runs).filter_map(ratio).collect();
     ratios.sort_by(f64::total_cmp);

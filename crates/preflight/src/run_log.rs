@@ -22,6 +22,8 @@ pub(crate) struct RunLog {
     /// Poses or positions.
     pub(crate) truth: Vec<TruthSample>,
     pub(crate) displacements: Vec<Displacement>,
+    /// Spans of the log and of the measurements, where both are of the same time ([`Run::spans_s`]), seconds.
+    pub(crate) spans_s: Option<[f64; 2]>,
     /// What tapes, walls, returns and a gyroscope say of the motion between two instants.
     pub(crate) partial: Vec<PartialRow>,
 }
@@ -107,6 +109,7 @@ impl RunLog {
             has_rates: matches!(odometry.wheels, WheelLog::Speeds(_) | WheelLog::Twist { .. }),
             truth,
             displacements: run.run().displacements.clone(),
+            spans_s: run.run().spans_s(),
             partial: partial(run.run()),
         })
     }
@@ -125,6 +128,10 @@ impl RunLog {
     /// All times by a factor.
     pub(crate) fn scale_time(&mut self, factor: f64) {
         self.t_s.iter_mut().for_each(|t_s| *t_s *= factor);
+        self.spans_s.iter_mut().for_each(|[logged_s, _]| *logged_s *= factor);
+        for of in self.partial.iter_mut().filter(|of| of.part == Part::GyroTurn) {
+            (of.from_s, of.to_s) = (factor * of.from_s, factor * of.to_s);
+        }
         self.scale_truth_time(factor);
     }
 
@@ -134,6 +141,11 @@ impl RunLog {
         for displacement in &mut self.displacements {
             displacement.t0_s *= factor;
             displacement.t1_s *= factor;
+        }
+        self.spans_s.iter_mut().for_each(|[_, measured_s]| *measured_s *= factor);
+        // A gyroscope rides on the robot and has the log's time.
+        for of in self.partial.iter_mut().filter(|of| of.part != Part::GyroTurn) {
+            (of.from_s, of.to_s) = (factor * of.from_s, factor * of.to_s);
         }
     }
 

@@ -166,10 +166,6 @@ pub(crate) const MIN_OWN_STEP_M: f64 = 5e-3;
 /// Budgeted: a turn, over which wheels err by more than a milliradian.
 pub(crate) const MIN_OWN_TURN_RAD: f64 = 3.0;
 
-/// Seconds. Rows that lie farther apart, of a log of many rows, are stamped in milliseconds.
-/// Convention: wheels are logged at 1 Hz or more.
-pub(crate) const MAX_ROW_S: f64 = 4.0;
-
 /// Rows of a log whose times can be judged.
 /// Convention: logs of a protocol that is read at its ends have two rows a run.
 pub(crate) const MIN_ROWS: usize = 20;

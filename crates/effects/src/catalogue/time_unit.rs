@@ -81,8 +81,8 @@ impl Forward for State {
 /// The log's span over that of the measurements, by the middle run.
 fn span_ratio(dataset: &Dataset) -> Option<f64> {
     let ratio = |run: &Run| {
-        let ([first_s, last_s], logged_s) = run.measured_span_s().zip(run.logged_span_s())?;
-        (logged_s > 0.0).then(|| logged_s / (last_s - first_s))
+        let [logged_s, measured_s] = run.spans_s()?;
+        Some(logged_s / measured_s)
     };
     median(dataset.runs.iter().filter_map(ratio).collect())
 }

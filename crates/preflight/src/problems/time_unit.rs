@@ -1,10 +1,12 @@
 //! Times in milliseconds: of all tables, or of one. The checks that follow have seconds.
 
+use dataset::MAX_ROW_S;
+
 use crate::kind::Kind;
 use crate::problem::{Problem, Severity};
 use crate::run_log::RunLog;
 use crate::session_check::SessionCheck;
-use crate::settings::{CLOCK_UNIT_RATIO, MAX_ROW_S, MIN_ROWS, MIN_SPEED_M_S};
+use crate::settings::{CLOCK_UNIT_RATIO, MIN_ROWS, MIN_SPEED_M_S};
 
 pub(crate) fn found(check: &mut SessionCheck) {
     let mut ratios: Vec<f64> = check.runs.iter().filter_map(spans).collect();
@@ -44,17 +46,9 @@ pub(crate) fn found(check: &mut SessionCheck) {
 
 /// What the instrument's records span over what the log spans.
 fn spans(run: &RunLog) -> Option<f64> {
-    let log_s = run.t_s.last()? - run.t_s.first()?;
-    let truth_s = match (run.truth.first(), run.displacements.first()) {
-        (Some(first), _) => run.truth.last()?.t_s - first.t_s,
-        (None, Some(first)) => run.displacements.last()?.t1_s - first.t0_s,
-        (None, None) => return None,
-    };
-    (log_s > 0.0
-        && truth_s > 0.0
-        && run.t_s.len() >= MIN_ROWS
-        && run.truth.len().max(run.displacements.len()) >= MIN_ROWS)
-        .then(|| truth_s / log_s)
+    let [log_s, truth_s] = run.spans_s?;
+    let are_many = run.is_seen_in_part() || run.truth.len().max(run.displacements.len()) >= MIN_ROWS;
+    (are_many && run.t_s.len() >= MIN_ROWS).then(|| truth_s / log_s)
 }
 
 pub(super) fn median_row_s(run: &RunLog) -> Option<f64> {
