@@ -191,3 +191,32 @@ fn measured(run: &Run) -> usize {
     let of_poses = run.truth.len() + run.headings.len() + run.displacements.len() + run.point_readings.len();
     of_poses + run.wheel_reference.len() + run.revisits.len() + run.distances.len() + run.walls.len()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_are_spread_over_all_and_meet_nothing_that_recurs_at_one_phase() {
+        assert_eq!(spread(0, 1), [0; 0]);
+        assert_eq!(spread(5, 5), [0, 1, 2, 3, 4]);
+        let places = spread(1000, 50);
+        assert!(places.iter().enumerate().all(|(stratum, place)| place / 20 == stratum), "{places:?}");
+        // Rejects each 20th place: all would be of one phase.
+        for period in [2, 4, 5, 10, 20] {
+            let of_phase = |phase: usize| places.iter().filter(|place| *place % period == phase).count();
+            let fair = 50.0 / period as f64;
+            for phase in 0..period {
+                assert!((of_phase(phase) as f64 - fair).abs() <= 3.0, "{} of phase {phase}/{period}", of_phase(phase));
+            }
+        }
+    }
+
+    #[test]
+    fn rows_and_measurements_bound_what_is_taken_and_something_is() {
+        assert_eq!(wanted(1000, 2 * SUBSAMPLE_MEASUREMENTS, 2 * SUBSAMPLE_MEASUREMENTS), 500);
+        assert_eq!(wanted(1000, 10 * SUBSAMPLE_ROWS, SUBSAMPLE_MEASUREMENTS), 100);
+        assert_eq!(wanted(1000, 10, 10), 1000);
+        assert_eq!(wanted(1, usize::MAX >> 20, 1), 1);
+    }
+}
