@@ -77,7 +77,7 @@ pub(crate) fn refit<'a>(
     let from_here = from.fit.extended_from(estimates.clone(), &mut terms(&candidates)).ok().filter(takes_enough);
     let from_here = match from_here {
         Some(fit) if !fit.solution.left_basin => {
-            return Some(AugmentedModel { fit: fit.without_innovations(), candidates });
+            return Some(AugmentedModel { fit, candidates });
         }
         from_here => from_here,
     };
@@ -85,7 +85,7 @@ pub(crate) fn refit<'a>(
     let from_base = base.extended_from(zeros, &mut terms(&candidates)).ok().filter(takes_enough);
     let most = [&from_here, &from_base].into_iter().flatten().map(count).fold(0.0, f64::max);
     let fit = from_here.into_iter().chain(from_base).min_by(|a, b| cost(a, most).total_cmp(&cost(b, most)))?;
-    Some(AugmentedModel { fit: fit.without_innovations(), candidates })
+    Some(AugmentedModel { fit, candidates })
 }
 
 /// A model's candidates but one.

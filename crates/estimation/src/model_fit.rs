@@ -97,7 +97,7 @@ impl ModelFit<'_> {
     pub(crate) fn with_records<'b>(self, records: Records<'b>) -> ModelFit<'b> {
         let Self { thinning, nominal, start, solution, columns, unobservable, prior, ends, parts, .. } = self;
         let pass =
-            Pass { innovations: Vec::new(), outliers: Vec::new(), partial_outliers: Vec::new(), ..solution.pass };
+            Pass { innovations: Arc::default(), outliers: Vec::new(), partial_outliers: Vec::new(), ..solution.pass };
         let solution = Solution { pass, ..solution };
         let (displacements_in_series, ungated) = (self.displacements_in_series, self.ungated);
         ModelFit {
@@ -173,7 +173,7 @@ impl ModelFit<'_> {
         (0..3)
             .map(|component| {
                 let (mut products, mut squares, mut pairs, mut count) = (0.0, 0.0, 0.0_f64, 0.0);
-                for phase in &self.solution.pass.innovations {
+                for phase in self.solution.pass.innovations.iter() {
                     let series: Vec<_> = phase.iter().filter(|innovation| innovation.component == component).collect();
                     for (number, innovation) in series.iter().enumerate() {
                         squares += innovation.z * innovation.z;
@@ -317,7 +317,7 @@ impl ModelFit<'_> {
     }
 
     /// The fit with further terms, whose values are free beside the columns that are free already, on the
-    /// same measurements.
+    /// same measurements; without innovations, which [`Self::with_innovations`] finds.
     ///
     /// # Errors
     /// [`EstimationError`] when it diverges.
@@ -342,7 +342,7 @@ impl ModelFit<'_> {
         from.model.term_values = term_values;
         // Models with terms are compared by their likelihoods.
         let mut extended = Self { columns, ends: ConvergenceCriterion::Likelihood, ..self.clone() };
-        let options = extended.fit_options();
+        let options = FitOptions { innovations: false, ..extended.fit_options() };
         extended.solution = fit_from(&extended.records, &extended.selections, from, &extended.prior, terms, &options)?;
         Ok(extended)
     }
