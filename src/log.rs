@@ -23,7 +23,10 @@ impl Log {
             return Ok(Self::Whole(read_datasets(paths, terminal)?));
         };
         for (blocks, path) in blocks.iter().zip(datasets_at(paths)?) {
-            blocks.warnings().iter().for_each(|warning| terminal.remark(&format!("warning: {}: {warning}", path.display())));
+            blocks
+                .warnings()
+                .iter()
+                .for_each(|warning| terminal.remark(&format!("warning: {}: {warning}", path.display())));
         }
         let bar = terminal.stages("reading");
         advance(&bar, "all rows of a large log", 0.0);

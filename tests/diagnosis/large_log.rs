@@ -122,9 +122,8 @@ fn a_fault_of_rows_is_found_where_it_is_and_the_effect_of_all_rows_beside_it() {
     // A fault in a stretch that is left out.
     let starts: Vec<(usize, usize)> = taken.iter().map(|run| place(run)).collect();
     let length = starts.iter().zip(&taken).map(|(_, run)| run.odometry.t_s.len()).max().expect("stretches");
-    let is_taken = |run: usize, row: usize| {
-        starts.iter().any(|(of, first)| *of == run && (*first..first + length).contains(&row))
-    };
+    let is_taken =
+        |run: usize, row: usize| starts.iter().any(|(of, first)| *of == run && (*first..first + length).contains(&row));
     let first = (length..ROWS - 2 * length)
         .step_by(1024)
         .find(|row| !is_taken(3, row - 1024) && !is_taken(3, *row) && !is_taken(3, row + 1024))

@@ -97,12 +97,7 @@ pub(crate) fn subsample(of: &Subsample) -> String {
     let shown = if shown.is_empty() { "none".to_owned() } else { shown.join("; ") };
     format!(
         "the log is large: {} of its {} stretches were diagnosed, spread over all of it ({} of {} rows, {} of {} measurements); faults of the records that counts show by themselves, looked for in all rows: {shown}",
-        of.diagnosed_stretches,
-        of.stretches,
-        of.diagnosed_rows,
-        of.rows,
-        of.diagnosed_measurements,
-        of.measurements
+        of.diagnosed_stretches, of.stretches, of.diagnosed_rows, of.rows, of.diagnosed_measurements, of.measurements
     )
 }
 

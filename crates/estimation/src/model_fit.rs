@@ -132,9 +132,18 @@ impl ModelFit<'_> {
         from: Option<InitialValues>,
         terms: &mut [Box<dyn ModelTerm>],
     ) -> Result<(), EstimationError> {
+        self.refit_by(&self.fit_options(), from, terms)
+    }
+
+    fn refit_by(
+        &mut self,
+        options: &FitOptions,
+        from: Option<InitialValues>,
+        terms: &mut [Box<dyn ModelTerm>],
+    ) -> Result<(), EstimationError> {
         let from =
             from.unwrap_or_else(|| InitialValues { model: self.start.clone(), noise: None, free_headings: None });
-        self.solution = fit_from(&self.records, &self.selections, from, &self.prior, terms, &self.fit_options())?;
+        self.solution = fit_from(&self.records, &self.selections, from, &self.prior, terms, options)?;
         Ok(())
     }
 
@@ -277,13 +286,14 @@ impl ModelFit<'_> {
 
     /// The fit to every measurement, outliers too. A large effect that shows in few measurements makes
     /// outliers of these, and is lost without them. Where measurements have gross errors of their own, it is
-    /// a worse fit.
+    /// a worse fit. It has no innovations, which [`Self::with_innovations`] finds.
     ///
     /// # Errors
     /// [`EstimationError`] when it diverges.
     pub fn refit_ungated(&self) -> Result<Self, EstimationError> {
         let mut ungated_fit = Self { ungated: true, ..self.clone() };
-        ungated_fit.refit(None, &mut [])?;
+        let options = FitOptions { innovations: false, ..ungated_fit.fit_options() };
+        ungated_fit.refit_by(&options, None, &mut [])?;
         Ok(ungated_fit)
     }
 
@@ -343,7 +353,7 @@ impl ModelFit<'_> {
         // Models with terms are compared by their likelihoods.
         let mut extended = Self { columns, ends: ConvergenceCriterion::Likelihood, ..self.clone() };
         let options = FitOptions { innovations: false, ..extended.fit_options() };
-        extended.solution = fit_from(&extended.records, &extended.selections, from, &extended.prior, terms, &options)?;
+        extended.refit_by(&options, Some(from), terms)?;
         Ok(extended)
     }
 

@@ -199,7 +199,9 @@ impl ModelFit<'_> {
         let parts: Vec<Part> = datasets
             .iter()
             .enumerate()
-            .flat_map(|(dataset, blocks)| (0..blocks.infos().len()).map(move |run| ((dataset, run), blocks.blocks(run))))
+            .flat_map(|(dataset, blocks)| {
+                (0..blocks.infos().len()).map(move |run| ((dataset, run), blocks.blocks(run)))
+            })
             .flat_map(|(run, count)| {
                 // The instrument of a run is found from all of it.
                 let part_blocks = if is_grouped_by_run { count } else { part_blocks };
@@ -207,8 +209,12 @@ impl ModelFit<'_> {
             })
             .collect();
         let this = &*self;
-        let part_equations: Vec<PartEquations> =
-            over_parts(datasets, &parts, |part, dataset| Ok::<_, OneStepError>(this.part_equations(part.run, &dataset)?), notice)?;
+        let part_equations: Vec<PartEquations> = over_parts(
+            datasets,
+            &parts,
+            |part, dataset| Ok::<_, OneStepError>(this.part_equations(part.run, &dataset)?),
+            notice,
+        )?;
         let measurements = part_equations.iter().map(|part| part.measurements).sum();
         let mut unused = Vec::new();
         for of_run in part_equations.chunk_by(|a, b| a.run == b.run) {

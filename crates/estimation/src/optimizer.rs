@@ -230,8 +230,12 @@ pub(crate) fn fit_from(
     }
     // After so small a step cached propagations are as good as integrated ones.
     let by = cached.as_ref().filter(|_| converged);
-    let pass_options =
-        PassOptions { innovations: options.innovations, gate: OutlierGate::of(options.ungated), by, ..PassOptions::default() };
+    let pass_options = PassOptions {
+        innovations: options.innovations,
+        gate: OutlierGate::of(options.ungated),
+        by,
+        ..PassOptions::default()
+    };
     let pass = pass(records, selections, &model, &noise, &headings, terms, pass_options);
     Ok(Solution { model, noise, free_headings: headings, pass, converged: converged || is_near, left_basin })
 }
