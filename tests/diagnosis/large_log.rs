@@ -16,7 +16,7 @@ use crate::support::document;
 
 const RUNS: usize = 10;
 /// Rows of a run, 100 a second.
-const ROWS: usize = 70_000;
+const ROWS: usize = 100_000;
 /// Rows for each measured pose.
 const ROWS_PER_POSE: usize = 50;
 const RAD_PER_COUNT: f64 = std::f64::consts::TAU / 4096.0;
@@ -124,17 +124,17 @@ fn a_fault_of_rows_is_found_where_it_is_and_the_effect_of_all_rows_beside_it() {
     let length = starts.iter().zip(&taken).map(|(_, run)| run.odometry.t_s.len()).max().expect("stretches");
     let is_taken =
         |run: usize, row: usize| starts.iter().any(|(of, first)| *of == run && (*first..first + length).contains(&row));
-    let first = (length..ROWS - 2 * length)
-        .step_by(1024)
-        .find(|row| !is_taken(3, row - 1024) && !is_taken(3, *row) && !is_taken(3, row + 1024))
-        .expect("a stretch that is left out");
-    tear(&mut dataset.runs[3], first + 50);
+    let is_left_out = |run: usize, row: usize| [row, row + 1024].iter().all(|row| !is_taken(run, *row));
+    let mut places = (0..RUNS).flat_map(|run| (1024..ROWS - 2048).step_by(512).map(move |row| (run, row)));
+    let (of, first) = places.find(|(run, row)| is_left_out(*run, *row)).expect("a stretch that is left out");
+    tear(&mut dataset.runs[of], first);
     write(&dataset, &temp.path().join("torn"), Existing::Refuse).expect("written");
     let torn = document(temp.path(), &["diagnose", "torn"]);
     let said = &torn["subsample"];
     assert_eq!(said["row_faults"][0]["id"], "torn_read");
     assert_eq!(said["row_faults"][0]["diagnosed_stretches"], said["row_faults"][0]["stretches"]);
-    assert!(said["diagnosed_stretches"].as_u64().expect("a number") > of.diagnosed_stretches as u64);
+    let more = said["diagnosed_stretches"].as_u64().expect("a number") - sound.subsample().diagnosed_stretches as u64;
+    assert!(more == 1 || more == 2, "{more}");
     assert!(said["sentence"].as_str().expect("a text").contains("torn_read"));
     let names: Vec<&str> =
         torn["findings"].as_array().expect("a list").iter().filter_map(|of| of["id"].as_str()).collect();
