@@ -89,8 +89,8 @@ pub(crate) fn refit<'a>(
     Some(AugmentedModel { fit, candidates })
 }
 
-/// The models that `refit` makes for each of some candidates, in their order. While a fit goes on it holds the
-/// propagations of all runs, and its passes take all cores by themselves: only a few go on at a time.
+/// The models that `refit` makes for each of some candidates, in their order. While a fit goes on it holds
+/// the propagations of all runs, and its passes take all cores by themselves: only a few go on at a time.
 pub(crate) fn refit_each<'a, T: Sync>(
     of: &[T],
     refit: impl Fn(&T) -> Option<AugmentedModel<'a>> + Sync,

@@ -67,7 +67,8 @@ pub struct Document {
     pub extended_model_why_null: Option<String>,
 }
 
-/// What was diagnosed of a log that is too large to be diagnosed as a whole: stretches that are spread over it.
+/// What was diagnosed of a log that is too large to be diagnosed as a whole: stretches that are spread over
+/// it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Subsample {
     /// In a sentence.

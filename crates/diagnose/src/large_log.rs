@@ -1,5 +1,5 @@
-//! Logs that are too large to be diagnosed as a whole: stretches of them, spread over everything, and what all
-//! rows show.
+//! Logs that are too large to be diagnosed as a whole: stretches of them, spread over everything, and what
+//! all rows show.
 //!
 //! Runs are cut into stretches of one length. One of each k successive stretches is diagnosed, at a place
 //! among the k that goes by the golden section: nothing that recurs in the log, such as a corner or the sense
@@ -88,8 +88,8 @@ impl LargeLog {
         Ok(Self { datasets: read, rows, spans, subsample })
     }
 
-    /// The stretches that are diagnosed, each a run; one of a run that was cut has the instant of its first row
-    /// in its id.
+    /// The stretches that are diagnosed, each a run; one of a run that was cut has the instant of its first
+    /// row in its id.
     #[must_use]
     pub fn datasets(&self) -> &[Dataset] {
         &self.datasets

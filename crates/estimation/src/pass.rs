@@ -34,8 +34,8 @@ use crate::thinning::{PropagationInterval, Selection};
 pub struct Pass {
     /// Each run's normal equation, in the order of sessions and runs; averaged over phases.
     pub runs: Vec<NormalEquations>,
-    /// The whitened innovations, phase by phase, in the order of segments and measurements; most of the memory,
-    /// which copies of a pass share.
+    /// The whitened innovations, phase by phase, in the order of segments and measurements; most of the
+    /// memory, which copies of a pass share.
     pub innovations: Arc<Vec<Vec<InnovationComponent>>>,
     /// How the robot moved before each measurement, phase by phase, in the order of the innovations; empty
     /// where it is not asked for.

@@ -38,7 +38,7 @@ pub(crate) const DECIMATION_STEP_S: f64 = 0.05;
 pub(crate) const OUTLIER_COST: f64 = 0.5 * 25.9 / 3.0;
 
 /// Number. Refits of candidates that go on at a time.
-/// Budgeted: one needs 200 bytes a measurement beside what all share, and two occupy the cores where runs are
+/// Budgeted: one needs 150 bytes a measurement beside what all share, and two occupy the cores where runs are
 /// few.
 pub(crate) const MAX_FITS_AT_A_TIME: usize = 2;
 
