@@ -17,8 +17,9 @@ use estimation::{OneStep, RISE_95, is_large, refuse_wrapped_counters};
 
 use crate::check;
 use crate::html_report::{CalibrationPage, refuse_file};
+use crate::log::blocks_at;
 use crate::simulate::write_whole;
-use crate::terminal::{Failure, Terminal, advance, cell, datasets_at, folder_name, read_datasets, table};
+use crate::terminal::{Failure, Terminal, advance, cell, datasets_at, read_datasets, table};
 
 /// Calibrate one robot from its sessions.
 #[derive(Args)]
@@ -69,7 +70,11 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let chosen: Vec<&dyn Method> =
         METHODS.iter().copied().filter(|method| arguments.method == ALL || method.name() == arguments.method).collect();
     let has_joint = chosen.iter().any(|method| method.name() == joint);
-    let large = if has_joint && !arguments.online && !arguments.profile { large(arguments)? } else { None };
+    let large = if has_joint && !arguments.online && !arguments.profile {
+        blocks_at(&arguments.datasets)?.filter(|blocks| is_large(blocks))
+    } else {
+        None
+    };
     // What is large is held for the methods that can do nothing else.
     let datasets =
         if large.is_some() && chosen.len() == 1 { Vec::new() } else { read_datasets(&arguments.datasets, terminal)? };
@@ -142,18 +147,6 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     show(&report, &robot, runs, terminal)?;
     terminal.document(&report)?;
     Ok(ExitCode::SUCCESS)
-}
-
-/// The datasets by blocks, where they are too large for a fit as a whole.
-fn large(arguments: &Arguments) -> Result<Option<Vec<Blocks>>, Failure> {
-    let mut all = Vec::new();
-    for path in datasets_at(&arguments.datasets)? {
-        // What cannot be read is told by whoever reads it as a whole.
-        let Ok(Some(mut blocks)) = Blocks::open(&path) else { return Ok(None) };
-        blocks.name_if_nameless(|| folder_name(&path));
-        all.push(blocks);
-    }
-    Ok(is_large(&all).then_some(all))
 }
 
 /// `joint` on large datasets; what was noticed of them is said.

@@ -14,8 +14,9 @@ use indicatif::ProgressBar;
 use crate::check;
 use crate::diagnosis_page::Page;
 use crate::html_report::DiagnosisPage;
+use crate::log::Log;
 use crate::simulate::{refuse_filled, write_folder, write_whole};
-use crate::terminal::{Failure, Terminal, advance, cell, read_datasets, table};
+use crate::terminal::{Failure, Terminal, advance, cell, table};
 
 /// What the calibrated model gets wrong: the causes that explain it, the extended model, and the gain
 /// on runs that it has not seen.
@@ -45,22 +46,22 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     if let Some(out) = &arguments.out {
         refuse_filled(out, arguments.force)?;
     }
-    let datasets = read_datasets(&arguments.datasets, terminal)?;
-    check::before(&datasets, terminal);
+    let log = Log::read(&arguments.datasets, terminal)?;
+    check::before(log.datasets(), terminal);
     let bar = terminal.stages("diagnose");
     let options = Options { without: arguments.without.clone(), on_stage: shown_on(bar.clone()), ..Options::default() };
-    let diagnosis = ::diagnose::diagnose(&datasets, &options);
+    let diagnosis = log.diagnose(&options);
     bar.finish_and_clear();
     let mut diagnosis = diagnosis?;
     if arguments.nested {
         let options = Options { without: arguments.without.clone(), ..Options::default() };
-        diagnosis.document.nested = nested_gains(&datasets, &options)?;
+        diagnosis.document.nested = nested_gains(log.datasets(), &options)?;
         if diagnosis.document.nested.is_empty() {
             terminal.remark("--nested: one session and one kind of path leave nothing to be held out");
         }
     }
     if let Some(out) = &arguments.out {
-        write_diagnosis(&mut diagnosis, &datasets, &arguments.datasets, (out, arguments.force))?;
+        write_diagnosis(&mut diagnosis, log.datasets(), &arguments.datasets, (out, arguments.force))?;
         terminal.remark(&format!(
             "findings in {}; report.html is to be looked at, report.md has the same text",
             out.display()
@@ -165,6 +166,9 @@ fn show_nested(nested: &NestedGain, terminal: &Terminal) -> Result<(), Failure> 
 
 fn show(document: &Document, terminal: &Terminal) -> Result<(), Failure> {
     terminal.say(&document.sentence)?;
+    if let Some(subsample) = &document.subsample {
+        terminal.say(&subsample.sentence)?;
+    }
     if !document.findings.is_empty() {
         let mut findings = table(&["finding", "names", "probability", "z"], 2);
         for finding in &document.findings {

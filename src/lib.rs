@@ -58,6 +58,7 @@ mod import_csv;
 mod import_robot;
 mod import_ros2;
 mod import_tum;
+mod log;
 mod manual;
 mod merge;
 mod plain_text;

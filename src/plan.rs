@@ -10,9 +10,10 @@ use serde::Serialize;
 
 use crate::diagnose_command::shown_on;
 use crate::html_report::write_plan;
+use crate::log::Log;
 use crate::plan_instruments::{Expected, expected, show as show_instruments};
 use crate::simulate::{refuse_filled, write_whole};
-use crate::terminal::{Failure, Terminal, advance, read_datasets, table};
+use crate::terminal::{Failure, Terminal, advance, table};
 
 /// The next experiment: what discriminates the candidates that a diagnosis leaves, or shows what it could not
 /// see; from a scenario, what to drive before there is any data.
@@ -120,13 +121,16 @@ fn of_data(
     arguments: &Arguments,
     terminal: &Terminal,
 ) -> Result<ExitCode, Failure> {
-    let datasets = read_datasets(sources, terminal)?;
+    let log = Log::read(sources, terminal)?;
     let bar = terminal.stages("plan");
     let options = Options { without: arguments.without.clone(), limits: *limits, on_stage: shown_on(bar.clone()) };
-    let diagnosis = ::diagnose::diagnose(&datasets, &options);
+    let diagnosis = log.diagnose(&options);
     bar.finish_and_clear();
     let Diagnosis { document, extended, .. } = diagnosis?;
     terminal.say(&document.sentence)?;
+    if let Some(subsample) = &document.subsample {
+        terminal.say(&subsample.sentence)?;
+    }
     let (mut scenarios, mut of_instruments) = (Vec::new(), Vec::new());
     match &document.next_experiment {
         Some(next) => {
@@ -137,7 +141,7 @@ fn of_data(
             if let Some(out) = &arguments.out {
                 let scenario = extended.map_err(|why| format!("{}: no plan.toml: {why}", out.display()))?;
                 scenarios = write_scenarios(out, &scenario, next, terminal)?;
-                let names = datasets.iter().filter_map(|dataset| dataset.provenance.name.as_deref());
+                let names = log.datasets().iter().filter_map(|dataset| dataset.provenance.name.as_deref());
                 write_plan(
                     &names.collect::<Vec<_>>().join(", "),
                     next,

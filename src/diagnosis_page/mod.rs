@@ -45,6 +45,9 @@ impl Page<'_> {
             calib::Names::Several(names) => names.join(", "),
         };
         writeln!(page, "# Diagnosis of {names}\n\n{}\n", words::verdict(self.document))?;
+        if let Some(subsample) = &self.document.subsample {
+            writeln!(page, "{}.\n", words::capitalised(&subsample.sentence))?;
+        }
         self.findings(page)?;
         self.residuals(page, pictures)?;
         self.checks(page)?;

@@ -258,6 +258,12 @@ fn headline(document: &Document) -> String {
 
 /// What it means for odometry.
 fn lead(document: &Document) -> String {
+    let subsample =
+        document.subsample.as_ref().map_or_else(String::new, |of| format!(" {}.", capitalised(&of.sentence)));
+    format!("{}{subsample}", lead_of_findings(document))
+}
+
+fn lead_of_findings(document: &Document) -> String {
     if document.findings.is_empty() {
         let blind = document.blind_to.len();
         let unshown = if blind == 0 {

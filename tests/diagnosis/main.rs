@@ -4,6 +4,7 @@
 mod blind_benchmark;
 mod extended_model;
 mod hidden_effects;
+mod large_log;
 mod nested_gain;
 mod ordinary_logs;
 #[path = "../support/plain_robot.rs"]

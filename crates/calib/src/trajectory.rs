@@ -198,6 +198,7 @@ impl Trajectory {
         augmented: &AugmentedCalibration,
         driven_m: &mut f64,
     ) -> Self {
+        *driven_m = run.run().session_m.unwrap_or(*driven_m);
         let mut terms = augmented.terms.clone();
         let body_from_sensor = augmented.calibration.body_from_sensor();
         let model = augmented.model(&geometry);

@@ -43,6 +43,7 @@ pub use identity::{parse_recorded, parse_robot_id};
 pub use interval_means::interval_means;
 pub use jiff::Timestamp;
 pub use map_distortion::MapDistortion;
+pub use measurement_times::RunSpans;
 pub use partial::{GyroNoise, GyroSample, HeadingReading, LidarExtrinsics, Revisit, TapeDistance, WallReading};
 pub use pose_covariance::PoseCovariance;
 pub use prefetch::read_ahead;

@@ -164,6 +164,9 @@ pub struct Run {
     /// Spans over which the counts do not tell how the robot moved, in time order. No part of the format:
     /// who examines the records sets them, and nothing is compared across them.
     pub unknown_motion: Vec<UnknownMotion>,
+    /// Distance that the robot had driven in the session before the run, metres; `None`: in the runs before
+    /// it. No part of the format: who leaves runs or parts of them out sets it.
+    pub session_m: Option<f64>,
 }
 
 impl Run {

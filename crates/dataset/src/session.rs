@@ -105,6 +105,26 @@ impl<'a> RunView<'a> {
         }
     }
 
+    /// Mean distance that the wheels roll from the first row to the last, forward and backward, metres by the
+    /// nominal values; 0 where they say nothing of it.
+    #[must_use]
+    pub fn rolled_m(&self, robot: &NominalRobot) -> f64 {
+        fn turned<C: Count>(column: &[C]) -> f64 {
+            column.windows(2).map(|pair| pair[1].since(pair[0]).abs()).sum()
+        }
+        let turned_rad = match &self.run.odometry.wheels {
+            WheelLog::Ticks(ticks) => {
+                let rad_per_tick = robot.ticks_per_rev.map_or(0.0, |ticks| std::f64::consts::TAU / ticks);
+                ticks.as_ref().map(|column| rad_per_tick * turned(column))
+            }
+            WheelLog::Angles(angles) => angles.as_ref().map(|column| turned(column)),
+            WheelLog::Speeds(_) | WheelLog::Twist { .. } => {
+                self.rebuilt_angles_rad(robot).map_or(Wheels::both(0.0), |angles| angles.map(|column| turned(&column)))
+            }
+        };
+        0.25 * (turned_rad.left * robot.left_wheel_diameter_m + turned_rad.right * robot.right_wheel_diameter_m)
+    }
+
     /// The contact speeds that a row reports, m/s, for a robot that reports speeds or its twist.
     #[must_use]
     pub fn reported_speed_m_s(&self, robot: &NominalRobot, row: usize) -> Option<Wheels<f64>> {
@@ -320,6 +340,7 @@ mod tests {
             .dead_reckon(&robot(), &geometry, Rule::ExactArc, Pose::IDENTITY, |t_s, pose| last = (t_s, pose));
         let exact = kinematics::Increment { distance_m: 1.5, turn_rad: -1.0 }.arc();
         assert_eq!(last.0, 5.0);
+        assert!((session.runs[0].rolled_m(&robot()) - 1.5).abs() < 1e-13);
         assert!(last.1.position().distance_m(exact.position()) < 1e-13);
         assert!((last.1.theta_rad - exact.theta_rad).abs() < 1e-13);
     }

@@ -5,9 +5,10 @@ use std::ops::Range;
 
 use estimation::{Column, ModelFit, NormalEquations, total};
 use nalgebra::DVector;
+use rayon::prelude::*;
 
 use crate::candidate::{Candidate, terms};
-use crate::settings::search::{MIN_TAKEN_FRACTION, OUTLIER_COST};
+use crate::settings::search::{MAX_FITS_AT_A_TIME, MIN_TAKEN_FRACTION, OUTLIER_COST};
 
 /// A fit with effects.
 #[derive(Debug, Clone)]
@@ -77,7 +78,7 @@ pub(crate) fn refit<'a>(
     let from_here = from.fit.extended_from(estimates.clone(), &mut terms(&candidates)).ok().filter(takes_enough);
     let from_here = match from_here {
         Some(fit) if !fit.solution.left_basin => {
-            return Some(AugmentedModel { fit: fit.without_innovations(), candidates });
+            return Some(AugmentedModel { fit, candidates });
         }
         from_here => from_here,
     };
@@ -85,7 +86,17 @@ pub(crate) fn refit<'a>(
     let from_base = base.extended_from(zeros, &mut terms(&candidates)).ok().filter(takes_enough);
     let most = [&from_here, &from_base].into_iter().flatten().map(count).fold(0.0, f64::max);
     let fit = from_here.into_iter().chain(from_base).min_by(|a, b| cost(a, most).total_cmp(&cost(b, most)))?;
-    Some(AugmentedModel { fit: fit.without_innovations(), candidates })
+    Some(AugmentedModel { fit, candidates })
+}
+
+/// The models that `refit` makes for each of some candidates, in their order. While a fit goes on it holds
+/// the propagations of all runs, and its passes take all cores by themselves: only a few go on at a time.
+pub(crate) fn refit_each<'a, T: Sync>(
+    of: &[T],
+    refit: impl Fn(&T) -> Option<AugmentedModel<'a>> + Sync,
+) -> Vec<AugmentedModel<'a>> {
+    let few = |few: &[T]| few.par_iter().filter_map(&refit).collect::<Vec<_>>();
+    of.chunks(MAX_FITS_AT_A_TIME).flat_map(few).collect()
 }
 
 /// A model's candidates but one.

@@ -18,6 +18,7 @@ use crate::document::{Document, Gain};
 use crate::finding::Finding;
 use crate::findings::{StageResults, findings};
 use crate::gain::gain_by_level;
+use crate::large_log::LargeLog;
 use crate::log_rows::{check_rows, check_spans};
 use crate::mean_structure::{THINNED, mean_structure};
 use crate::plan::{Limits, next_experiment};
@@ -121,18 +122,40 @@ const EVERY_MEASUREMENT: FitSettings = FitSettings::GEOMETRY_ONLY;
 /// # Errors
 /// [`DiagnoseError`] when an id is unknown or no base model can be fitted.
 pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, DiagnoseError> {
+    diagnose_rows(datasets, None, options)
+}
+
+/// The same of stretches of a large log; what all of its rows show is said too.
+///
+/// # Errors
+/// As [`diagnose`].
+pub fn diagnose_large(log: &LargeLog, options: &Options) -> Result<Diagnosis, DiagnoseError> {
+    diagnose_rows(log.datasets(), Some(log), options)
+}
+
+fn diagnose_rows(
+    datasets: &[Dataset],
+    large: Option<&LargeLog>,
+    options: &Options,
+) -> Result<Diagnosis, DiagnoseError> {
     if let Some(id) = options.without.iter().find(|id| !CATALOGUE.contains(&id.as_str())) {
         return Err(DiagnoseError::UnknownEffect { id: id.clone() });
     }
-    match stages(datasets, options, MIN_COMMON_CLOCK_OFFSET_S) {
+    match stages((datasets, large), options, MIN_COMMON_CLOCK_OFFSET_S) {
         // To an instrument that is precise, a clock that is off by less makes most measurements outliers.
-        Err(DiagnoseError::OdometryUncorrelated { .. }) => stages(datasets, options, MIN_REJECTING_CLOCK_OFFSET_S),
+        Err(DiagnoseError::OdometryUncorrelated { .. }) => {
+            stages((datasets, large), options, MIN_REJECTING_CLOCK_OFFSET_S)
+        }
         result => result,
     }
 }
 
 /// The stages, where an offset of all clocks from `min_common_clock_s` on is taken off before the fit.
-fn stages(datasets: &[Dataset], options: &Options, min_common_clock_s: f64) -> Result<Diagnosis, DiagnoseError> {
+fn stages(
+    (datasets, large): (&[Dataset], Option<&LargeLog>),
+    options: &Options,
+    min_common_clock_s: f64,
+) -> Result<Diagnosis, DiagnoseError> {
     let begins = |step| options.on_stage.begins(step);
     begins(Step::Motions);
     let every_term = mean_terms(&options.without);
@@ -207,7 +230,11 @@ fn stages(datasets: &[Dataset], options: &Options, min_common_clock_s: f64) -> R
         catalogue.clear();
         structure = mean_structure(records, base, &catalogue);
     }
-    let (log, spans) = (check_rows(records), check_spans(records));
+    // Records that were corrected are not those of which all rows were looked at.
+    let (log, spans) = match large.filter(|_| faults.is_empty() && stamps.is_none()) {
+        Some(large) => (large.check_rows(), large.check_spans()),
+        None => (check_rows(records), check_spans(records)),
+    };
     let model = structure.model();
     let names = session_names(records);
     begins(Step::CarryOver);
@@ -261,6 +288,7 @@ fn stages(datasets: &[Dataset], options: &Options, min_common_clock_s: f64) -> R
         dataset: Names::of(names.clone()),
         verdict: text::verdict(&findings),
         sentence: text::summary(&findings, gain.as_ref()),
+        subsample: large.map(|large| large.subsample().clone()),
         checks: structure.checked.checks.iter().chain(&log).chain(&spans).map(TestResult::document).collect(),
         findings: findings.iter().map(text::finding).collect(),
         candidates: alternatives.iter().map(text::candidate).collect(),

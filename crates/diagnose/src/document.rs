@@ -30,6 +30,9 @@ pub struct Document {
     pub verdict: Verdict,
     /// In a sentence.
     pub sentence: String,
+    /// What was diagnosed of a log that is too large to be diagnosed as a whole; absent where all of it was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub subsample: Option<Subsample>,
     /// The tests of the residuals that the final model leaves.
     pub checks: Vec<Check>,
     /// What was found.
@@ -62,6 +65,39 @@ pub struct Document {
     /// Why there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub extended_model_why_null: Option<String>,
+}
+
+/// What was diagnosed of a log that is too large to be diagnosed as a whole: stretches that are spread over
+/// it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Subsample {
+    /// In a sentence.
+    pub sentence: String,
+    /// Rows of the odometry, of which each was looked at for faults that counts show by themselves.
+    pub rows: usize,
+    /// Rows of the odometry that were diagnosed.
+    pub diagnosed_rows: usize,
+    /// Rows of all that saw the robot.
+    pub measurements: usize,
+    /// Those of what was diagnosed.
+    pub diagnosed_measurements: usize,
+    /// Stretches into which runs are cut; a short run is one.
+    pub stretches: usize,
+    /// Stretches that were diagnosed.
+    pub diagnosed_stretches: usize,
+    /// Faults of the records that counts show by themselves, in all rows.
+    pub row_faults: Vec<RowFault>,
+}
+
+/// A fault of the records that counts show by themselves.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct RowFault {
+    /// The effect.
+    pub id: String,
+    /// How many stretches show it.
+    pub stretches: usize,
+    /// How many of these were diagnosed.
+    pub diagnosed_stretches: usize,
 }
 
 /// An effect of the catalogue, tested beside the calibration alone, and why it is no cause of a finding.

@@ -31,6 +31,7 @@ mod geometry_deviations;
 mod heterogeneity;
 mod kinds;
 mod large_errors;
+mod large_log;
 mod log_rows;
 mod map_errors;
 mod mean_lateness;
@@ -62,12 +63,13 @@ mod unknown_motion;
 mod wald;
 
 pub use alternatives::{Alternative, Status};
-pub use diagnosis::{DiagnoseError, Diagnosis, FittedModel, Options, diagnose};
+pub use diagnosis::{DiagnoseError, Diagnosis, FittedModel, Options, diagnose, diagnose_large};
 pub use document::{
     Blind, CandidateCause, Check, Compared, Differences, Document, Finding, Gain, GainLevel, HeldOutUnit, LevelGain,
-    NestedGain, NextExperiment, PlannedSession, Predicted, Smallest, UnlistedTerm, Value, Verdict,
+    NestedGain, NextExperiment, PlannedSession, Predicted, RowFault, Smallest, Subsample, UnlistedTerm, Value, Verdict,
 };
 pub use extended_model::{ExtendedModel, ExtendedModelError, ModelledEffect};
+pub use large_log::LargeLog;
 pub use nested_gain::nested_gains;
 pub use plan::{HANDLING_S, Limits, MINUTES, PlanError, ScenarioPlan, moved_over_m, plan_scenario};
 pub use residuals::{Bin, Component, Profile, Residuals, ResidualsByCovariate};

@@ -5,7 +5,9 @@
 //! what was outlying. If the increment were as uncertain as these four, it would be 20 R off with
 //! probability 1.6e-5: P(R < r) ≈ 4 r³ ∫φ⁴ = 0.13 r³ for four normal variables.
 
-use dataset::{Dataset, Odometry, Run, WheelLog};
+use std::collections::BTreeMap;
+
+use dataset::{Dataset, Odometry, Run, RunSpans, WheelLog};
 use estimation::stamp_jitter_s;
 use statrs::distribution::{DiscreteCDF, Poisson};
 
@@ -15,52 +17,85 @@ use crate::settings::records::{
     STANDSTILL_RATE_RATIO,
 };
 
-/// Whether log and measurements span about the same time, by the median over the runs of the ratio of
-/// spans.
+/// The spans of runs, by session and run.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Spans(BTreeMap<(usize, usize), RunSpans>);
+
+impl Spans {
+    /// Adds a run, or a part of one.
+    pub(crate) fn add(&mut self, run: (usize, usize), spans: RunSpans) {
+        let known = self.0.entry(run).or_default();
+        *known = known.with(spans);
+    }
+
+    /// Whether log and measurements span about the same time, by the median over the runs of the ratio of
+    /// spans.
+    pub(crate) fn test(&self) -> Option<TestResult> {
+        let ratio = |of: &RunSpans| of.comparable_s().map(|[logged_s, measured_s]| logged_s / measured_s);
+        let mut ratios: Vec<f64> = self.0.values().filter_map(ratio).collect();
+        ratios.sort_by(f64::total_cmp);
+        let statistic = *ratios.get(ratios.len() / 2)?;
+        let passes = (MAX_CLOCK_RATIO.recip()..MAX_CLOCK_RATIO).contains(&statistic);
+        // No scatter makes a clock thirty times as fast: the p-value is 0 or 1.
+        Some(TestResult { check: Check::LogSpans, statistic, p_value: f64::from(u8::from(passes)), passes })
+    }
+}
+
+/// Tests the spans of all runs.
 pub(crate) fn check_spans(datasets: &[Dataset]) -> Option<TestResult> {
-    let ratio = |run: &Run| {
-        let [logged_s, measured_s] = run.spans_s()?;
-        Some(logged_s / measured_s)
-    };
-    let mut ratios: Vec<f64> = datasets.iter().flat_map(|dataset| &dataset.runs).filter_map(ratio).collect();
-    ratios.sort_by(f64::total_cmp);
-    let statistic = *ratios.get(ratios.len() / 2)?;
-    let passes = (MAX_CLOCK_RATIO.recip()..MAX_CLOCK_RATIO).contains(&statistic);
-    // No scatter makes a clock thirty times as fast: the p-value is 0 or 1.
-    Some(TestResult { check: Check::LogSpans, statistic, p_value: f64::from(u8::from(passes)), passes })
+    let mut spans = Spans::default();
+    for (session, dataset) in datasets.iter().enumerate() {
+        for (position, run) in dataset.runs.iter().enumerate() {
+            spans.add((session, position), RunSpans::of(run));
+        }
+    }
+    spans.test()
 }
 
 /// Number of increments of a log, and of outlying ones.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-struct Rows {
+pub(crate) struct Rows {
     all: usize,
     outlying: usize,
 }
 
+impl std::ops::Add for Rows {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self { all: self.all + other.all, outlying: self.outlying + other.outlying }
+    }
+}
+
+impl Rows {
+    /// Of the counts of a run; none for robots that report none.
+    pub(crate) fn of(run: &Run) -> Self {
+        let Odometry { t_s, wheels: WheelLog::Ticks(ticks), .. } = &run.odometry else { return Self::default() };
+        if !run.info.continuous {
+            return Self::default();
+        }
+        let of = ticks.as_ref().map(|column| of_column(t_s, column));
+        of.left + of.right
+    }
+
+    /// Tests whether more of them are outlying than chance makes; `None` where there are none.
+    pub(crate) fn test(&self) -> Option<TestResult> {
+        let expected = Poisson::new(OUTLYING_ROW_PROBABILITY * self.all as f64).ok()?;
+        let p_value = self.outlying.checked_sub(1).map_or(1.0, |fewer| expected.sf(fewer as u64));
+        let statistic = self.outlying as f64;
+        Some(TestResult { check: Check::LogRows, statistic, p_value, passes: p_value >= LOG_ROWS_LEVEL })
+    }
+}
+
 /// Tests the counts of all runs; `None` for robots that report none.
 pub(crate) fn check_rows(datasets: &[Dataset]) -> Option<TestResult> {
-    let rows = datasets.iter().flat_map(|dataset| &dataset.runs).fold(Rows::default(), |sum, run| {
-        let of = of_run(&run.odometry, run.info.continuous);
-        Rows { all: sum.all + of.all, outlying: sum.outlying + of.outlying }
-    });
-    let expected = Poisson::new(OUTLYING_ROW_PROBABILITY * rows.all as f64).ok()?;
-    let p_value = rows.outlying.checked_sub(1).map_or(1.0, |fewer| expected.sf(fewer as u64));
-    let statistic = rows.outlying as f64;
-    Some(TestResult { check: Check::LogRows, statistic, p_value, passes: p_value >= LOG_ROWS_LEVEL })
+    let runs = datasets.iter().flat_map(|dataset| &dataset.runs);
+    runs.map(Rows::of).fold(Rows::default(), |sum, rows| sum + rows).test()
 }
 
 /// Whether a run's log has outlying rows: turns over them are none of the robot.
 pub(crate) fn has_outlying_rows(run: &Run) -> bool {
-    of_run(&run.odometry, run.info.continuous).outlying > 0
-}
-
-fn of_run(odometry: &Odometry, continuous: bool) -> Rows {
-    let Odometry { t_s, wheels: WheelLog::Ticks(ticks), .. } = odometry else { return Rows::default() };
-    if !continuous {
-        return Rows::default();
-    }
-    let of = ticks.as_ref().map(|column| of_column(t_s, column));
-    Rows { all: of.left.all + of.right.all, outlying: of.left.outlying + of.right.outlying }
+    Rows::of(run).outlying > 0
 }
 
 fn of_column(t_s: &[f64], ticks: &[i64]) -> Rows {

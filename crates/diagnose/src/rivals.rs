@@ -4,10 +4,9 @@ use std::collections::BTreeMap;
 
 use estimation::ModelFit;
 use nalgebra::DVector;
-use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::augmented_model::{AugmentedModel, cost, count, refit};
+use crate::augmented_model::{AugmentedModel, cost, count, refit, refit_each};
 use crate::candidate::Candidate;
 use crate::fit_cache::FitCache;
 use crate::geometry_deviations::keeps_wheels;
@@ -73,7 +72,7 @@ pub(crate) fn rivals<'a>(
             candidates.insert(index, candidate.clone());
             known.fit(&candidates).cloned().or_else(|| refit(base, without, candidates))
         };
-        let models: Vec<AugmentedModel<'a>> = added.par_iter().filter_map(with).collect();
+        let models = refit_each(added, with);
         models.iter().for_each(|model| known.keep(model));
         models
     };

@@ -3,9 +3,8 @@
 use effects::{Channel, Covariate, Sparse};
 use estimation::ModelFit;
 use kinematics::Side;
-use rayon::prelude::*;
 
-use crate::augmented_model::{AugmentedModel, refit};
+use crate::augmented_model::{AugmentedModel, refit, refit_each};
 use crate::candidate::Candidate;
 use crate::covariates::{of_cycles, of_runs};
 use crate::gain::gain;
@@ -193,12 +192,7 @@ impl<'m, 'a> SparseSearch<'m, 'a> {
             refit(base, model, [&model.candidates[..], std::slice::from_ref(&scored.candidate)].concat())
                 .filter(|extended| keeps_wheels(&model.fit, &extended.fit))
         };
-        Some(Self {
-            model,
-            p_value,
-            trials,
-            refitted: scored[..MAX_SPARSE_REFITS.min(trials)].par_iter().filter_map(with).collect(),
-        })
+        Some(Self { model, p_value, trials, refitted: refit_each(&scored[..MAX_SPARSE_REFITS.min(trials)], with) })
     }
 
     /// The best of them that predicts held-out runs better, if the best is significant by its score.

@@ -8,7 +8,7 @@ use crate::alternatives::{Alternative, Status};
 use crate::carry_over::{CarryOver, Level};
 use crate::cause::{Basis, Cause, Doubt};
 use crate::check::{Check, ResidualPersistence};
-use crate::document::{self, Gain, GainLevel, UnlistedTerm, Value, Verdict};
+use crate::document::{self, Gain, GainLevel, Subsample, UnlistedTerm, Value, Verdict};
 use crate::finding::Finding;
 use crate::heterogeneity::Heterogeneity;
 use crate::settings::findings::MAX_EVENTS_SHOWN;
@@ -86,6 +86,19 @@ fn listed(values: &BTreeMap<String, Value>) -> String {
         })
         .collect();
     parts.join(", ")
+}
+
+/// What was diagnosed of a large log, and what was looked for in all of it.
+pub(crate) fn subsample(of: &Subsample) -> String {
+    let shown = of.row_faults.iter().map(|fault| {
+        format!("{} in {} stretches, of which {} were diagnosed", fault.id, fault.stretches, fault.diagnosed_stretches)
+    });
+    let shown: Vec<String> = shown.collect();
+    let shown = if shown.is_empty() { "none".to_owned() } else { shown.join("; ") };
+    format!(
+        "the log is large: {} of its {} stretches were diagnosed, spread over all of it ({} of {} rows, {} of {} measurements); faults of the records that counts show by themselves, looked for in all rows: {shown}",
+        of.diagnosed_stretches, of.stretches, of.diagnosed_rows, of.rows, of.diagnosed_measurements, of.measurements
+    )
 }
 
 /// The candidates, what speaks for them, and what casts doubt on them.

@@ -22,12 +22,16 @@ impl<'a> Decimated<'a> {
     /// Joins intervals in which both wheels keep turning, up to `longest_s` seconds; measurements stay where
     /// they are. `None` where more than half of the intervals would be left.
     pub(crate) fn of(records: &Records<'a>, selections: &[Selection], longest_s: f64) -> Option<Self> {
-        let (segments, ends): (Vec<_>, Vec<_>) =
-            records.segments.iter().map(|segment| join_intervals(segment, longest_s)).unzip();
-        let intervals =
-            |segments: &[Segment<'_>]| segments.iter().map(|segment| segment.intervals.len()).sum::<usize>();
-        if MIN_DECIMATION * intervals(&segments) > intervals(&records.segments) {
-            return None;
+        let most = records.segments.iter().map(|segment| segment.intervals.len()).sum::<usize>() / MIN_DECIMATION;
+        let (mut segments, mut ends, mut left) = (Vec::new(), Vec::new(), 0);
+        for segment in &records.segments {
+            let (joined, ends_of_segment) = join_intervals(segment, longest_s);
+            left += joined.intervals.len();
+            if left > most {
+                return None;
+            }
+            segments.push(joined);
+            ends.push(ends_of_segment);
         }
         let of_segment = |(propagations, ends): (&Vec<PropagationInterval>, &Vec<usize>)| {
             let of_propagation = |propagation: &PropagationInterval| PropagationInterval {

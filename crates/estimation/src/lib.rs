@@ -44,6 +44,7 @@ mod partial_observation;
 mod partial_outliers;
 mod partial_poses;
 mod partial_records;
+mod parts;
 mod pass;
 mod pass_options;
 mod path_shape;
@@ -79,9 +80,10 @@ pub use noise::{Noise, NoiseComponent};
 pub use normal_equations::{
     ClusterRobust, Information, NormalEquations, Projected, SchurComplement, free_basis, inverse, total,
 };
-pub use one_step::{LargeFit, OneStep, OneStepError, fit_large, is_large};
+pub use one_step::{LargeFit, OneStep, OneStepError, fit_large, is_large, many_rows, rows_and_measurements};
 pub use optimizer::{ConvergenceCriterion, FitOptions, Solution, fit, pass_with_innovations};
 pub use partial_outliers::PartialOutliers;
+pub use parts::{Part, over_parts};
 pub use pass::Pass;
 pub use pass_options::OutlierGate;
 pub use path_shape::PathShape;

@@ -97,7 +97,7 @@ impl ModelFit<'_> {
     pub(crate) fn with_records<'b>(self, records: Records<'b>) -> ModelFit<'b> {
         let Self { thinning, nominal, start, solution, columns, unobservable, prior, ends, parts, .. } = self;
         let pass =
-            Pass { innovations: Vec::new(), outliers: Vec::new(), partial_outliers: Vec::new(), ..solution.pass };
+            Pass { innovations: Arc::default(), outliers: Vec::new(), partial_outliers: Vec::new(), ..solution.pass };
         let solution = Solution { pass, ..solution };
         let (displacements_in_series, ungated) = (self.displacements_in_series, self.ungated);
         ModelFit {
@@ -132,9 +132,18 @@ impl ModelFit<'_> {
         from: Option<InitialValues>,
         terms: &mut [Box<dyn ModelTerm>],
     ) -> Result<(), EstimationError> {
+        self.refit_by(&self.fit_options(), from, terms)
+    }
+
+    fn refit_by(
+        &mut self,
+        options: &FitOptions,
+        from: Option<InitialValues>,
+        terms: &mut [Box<dyn ModelTerm>],
+    ) -> Result<(), EstimationError> {
         let from =
             from.unwrap_or_else(|| InitialValues { model: self.start.clone(), noise: None, free_headings: None });
-        self.solution = fit_from(&self.records, &self.selections, from, &self.prior, terms, &self.fit_options())?;
+        self.solution = fit_from(&self.records, &self.selections, from, &self.prior, terms, options)?;
         Ok(())
     }
 
@@ -173,7 +182,7 @@ impl ModelFit<'_> {
         (0..3)
             .map(|component| {
                 let (mut products, mut squares, mut pairs, mut count) = (0.0, 0.0, 0.0_f64, 0.0);
-                for phase in &self.solution.pass.innovations {
+                for phase in self.solution.pass.innovations.iter() {
                     let series: Vec<_> = phase.iter().filter(|innovation| innovation.component == component).collect();
                     for (number, innovation) in series.iter().enumerate() {
                         squares += innovation.z * innovation.z;
@@ -277,13 +286,14 @@ impl ModelFit<'_> {
 
     /// The fit to every measurement, outliers too. A large effect that shows in few measurements makes
     /// outliers of these, and is lost without them. Where measurements have gross errors of their own, it is
-    /// a worse fit.
+    /// a worse fit. It has no innovations, which [`Self::with_innovations`] finds.
     ///
     /// # Errors
     /// [`EstimationError`] when it diverges.
     pub fn refit_ungated(&self) -> Result<Self, EstimationError> {
         let mut ungated_fit = Self { ungated: true, ..self.clone() };
-        ungated_fit.refit(None, &mut [])?;
+        let options = FitOptions { innovations: false, ..ungated_fit.fit_options() };
+        ungated_fit.refit_by(&options, None, &mut [])?;
         Ok(ungated_fit)
     }
 
@@ -317,7 +327,7 @@ impl ModelFit<'_> {
     }
 
     /// The fit with further terms, whose values are free beside the columns that are free already, on the
-    /// same measurements.
+    /// same measurements; without innovations, which [`Self::with_innovations`] finds.
     ///
     /// # Errors
     /// [`EstimationError`] when it diverges.
@@ -342,8 +352,8 @@ impl ModelFit<'_> {
         from.model.term_values = term_values;
         // Models with terms are compared by their likelihoods.
         let mut extended = Self { columns, ends: ConvergenceCriterion::Likelihood, ..self.clone() };
-        let options = extended.fit_options();
-        extended.solution = fit_from(&extended.records, &extended.selections, from, &extended.prior, terms, &options)?;
+        let options = FitOptions { innovations: false, ..extended.fit_options() };
+        extended.refit_by(&options, Some(from), terms)?;
         Ok(extended)
     }
 

@@ -6,9 +6,7 @@
 //! of (θ₀ − θ)², and that is watched (Le Cam 1956; van der Vaart 1998, §5.7). The noise, the thinning, and
 //! whether the instrument has the extrinsics or a latency are those of the subsamples.
 
-use std::ops::Range;
-use std::sync::mpsc::{Receiver, channel, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use dataset::{Blocks, Dataset, DatasetError, NominalRobot, Session, Warning};
 use nalgebra::DVector;
@@ -20,9 +18,10 @@ use crate::model::{Column, Grouping, Instrument, Model};
 use crate::model_fit::{ModelFit, unobservable};
 use crate::normal_equations::{NormalEquations, total};
 use crate::optimizer::{ConvergenceCriterion, pass_settled};
+use crate::parts::{Part, over_parts};
 use crate::records::Records;
 use crate::settings::{
-    LARGE_ROWS, MAX_PART_THREADS, MAX_ROWS_PER_MEASUREMENT, MAX_SCORING_STEPS, MAX_SUBSAMPLE_ROWS, MIN_PART_BLOCKS,
+    LARGE_ROWS, MAX_ROWS_PER_MEASUREMENT, MAX_SCORING_STEPS, MAX_SUBSAMPLE_ROWS, MIN_PART_BLOCKS,
     MIN_PART_MEASUREMENTS, MIN_PART_PROPAGATIONS, ONE_STEP_TOLERANCE, PRELIMINARY_NOISE_TOLERANCE,
     SUBSAMPLE_MEASUREMENTS, SUBSAMPLE_NOISE_TOLERANCE, SUBSAMPLES,
 };
@@ -52,17 +51,25 @@ pub enum OneStepError {
     Estimation(#[from] EstimationError),
 }
 
-/// Whether datasets are too large for [`FitSettings::fit`], by [`LARGE_ROWS`], have a measurement in 500 rows
-/// at least, and no map whose distortion is stated.
+/// Whether datasets are too large for [`FitSettings::fit`]: they have [`many_rows`], and no map whose
+/// distortion is stated.
 #[must_use]
 pub fn is_large(datasets: &[Blocks]) -> bool {
-    let (rows, measurements) = rows_and_measurements(datasets);
     // What a map's distortion adds takes all measurements at once.
-    let has_map = datasets.iter().any(|blocks| blocks.header().truth_noise.map.is_some());
-    !has_map && rows + measurements > LARGE_ROWS && measurements.saturating_mul(MAX_ROWS_PER_MEASUREMENT) >= rows
+    datasets.iter().all(|blocks| blocks.header().truth_noise.map.is_none()) && many_rows(datasets)
 }
 
-fn rows_and_measurements(datasets: &[Blocks]) -> (usize, usize) {
+/// Whether datasets have more than [`LARGE_ROWS`], and a measurement in 500 rows at least, so that parts of
+/// them say what all do.
+#[must_use]
+pub fn many_rows(datasets: &[Blocks]) -> bool {
+    let (rows, measurements) = rows_and_measurements(datasets);
+    rows + measurements > LARGE_ROWS && measurements.saturating_mul(MAX_ROWS_PER_MEASUREMENT) >= rows
+}
+
+/// Rows of the odometry of all runs, and of all that saw them.
+#[must_use]
+pub fn rows_and_measurements(datasets: &[Blocks]) -> (usize, usize) {
     let of = |blocks: &Blocks, count: fn(&Blocks, usize) -> usize| -> usize {
         (0..blocks.infos().len()).map(|run| count(blocks, run)).sum()
     };
@@ -71,12 +78,9 @@ fn rows_and_measurements(datasets: &[Blocks]) -> (usize, usize) {
     })
 }
 
-/// Blocks of one run: dataset, run, blocks.
-type Part = (usize, usize, Range<usize>);
-
 /// The normal equation of a part, and what else it gives.
 struct PartEquations {
-    number: usize,
+    run: (usize, usize),
     equations: Option<NormalEquations>,
     own: Option<Instrument>,
     measurements: usize,
@@ -195,54 +199,32 @@ impl ModelFit<'_> {
         let parts: Vec<Part> = datasets
             .iter()
             .enumerate()
-            .flat_map(|(dataset, blocks)| (0..blocks.infos().len()).map(move |run| (dataset, run, blocks.blocks(run))))
-            .flat_map(|(dataset, run, count)| {
+            .flat_map(|(dataset, blocks)| {
+                (0..blocks.infos().len()).map(move |run| ((dataset, run), blocks.blocks(run)))
+            })
+            .flat_map(|(run, count)| {
                 // The instrument of a run is found from all of it.
-                let cuts = if is_grouped_by_run { 1 } else { count.div_ceil(part_blocks) };
-                (0..cuts).map(move |cut| (dataset, run, cut * count / cuts..(cut + 1) * count / cuts))
+                let part_blocks = if is_grouped_by_run { count } else { part_blocks };
+                Part::of_run(run, count, part_blocks)
             })
             .collect();
-        let workers = std::thread::available_parallelism().map_or(1, usize::from).min(MAX_PART_THREADS);
-        let mut part_equations = std::thread::scope(|scope| -> Result<Vec<PartEquations>, OneStepError> {
-            // No part waits in memory: the reading thread waits for a worker.
-            let (give, take) = sync_channel::<(usize, (usize, usize), Dataset)>(0);
-            let take = Arc::new(Mutex::new(take));
-            let (hand_in, collect) = channel();
-            for _ in 0..workers {
-                let (take, hand_in, this) = (Arc::clone(&take), hand_in.clone(), &*self);
-                scope.spawn(move || {
-                    while let Some((number, run, part)) = next(&take) {
-                        if hand_in.send(this.part_equations(number, run, &part)).is_err() {
-                            break;
-                        }
-                    }
-                });
-            }
-            drop((hand_in, take));
-            for (number, (dataset, run, blocks)) in parts.iter().enumerate() {
-                let loaded = datasets[*dataset].read(*run, blocks.clone())?;
-                loaded.warnings.iter().for_each(|warning| notice(*dataset, warning));
-                // The workers have stopped; what they handed in has the reason.
-                if give.send((number, (*dataset, *run), loaded.dataset)).is_err() {
-                    break;
-                }
-            }
-            drop(give);
-            Ok(collect.into_iter().collect::<Result<Vec<_>, EstimationError>>()?)
-        })?;
-        part_equations.sort_unstable_by_key(|part| part.number);
+        let this = &*self;
+        let part_equations: Vec<PartEquations> = over_parts(
+            datasets,
+            &parts,
+            |part, dataset| Ok::<_, OneStepError>(this.part_equations(part.run, &dataset)?),
+            notice,
+        )?;
         let measurements = part_equations.iter().map(|part| part.measurements).sum();
         let mut unused = Vec::new();
-        for of_run in part_equations.chunk_by(|a, b| run_of(&parts[a.number]) == run_of(&parts[b.number])) {
+        for of_run in part_equations.chunk_by(|a, b| a.run == b.run) {
             if of_run.iter().all(|part| part.equations.is_none()) {
-                unused.push(run_of(&parts[of_run[0].number]));
+                unused.push(of_run[0].run);
             }
         }
         Arc::make_mut(&mut self.records).unused = unused;
         if let Some(own) = &mut self.solution.model.own {
-            let found = part_equations
-                .iter()
-                .filter_map(|part| Some((own.grouping.group(run_of(&parts[part.number])), part.own?)));
+            let found = part_equations.iter().filter_map(|part| Some((own.grouping.group(part.run), part.own?)));
             own.of.extend(found);
         }
         Ok(GatheredParts {
@@ -252,17 +234,12 @@ impl ModelFit<'_> {
     }
 
     /// The normal equation of a part at the values in force.
-    fn part_equations(
-        &self,
-        number: usize,
-        run: (usize, usize),
-        part: &Dataset,
-    ) -> Result<PartEquations, EstimationError> {
+    fn part_equations(&self, run: (usize, usize), part: &Dataset) -> Result<PartEquations, EstimationError> {
         let sessions = [part.session()];
         refuse_wrapped_counters(&sessions)?;
         let records = Records::relative_to(&sessions, self.prior.measurement_sigma()).belonging_to(run);
         if records.segments.is_empty() && !records.has_partial() {
-            return Ok(PartEquations { number, equations: None, own: None, measurements: 0 });
+            return Ok(PartEquations { run, equations: None, own: None, measurements: 0 });
         }
         let selections = Selection::of(&records, self.thinning, &self.nominal);
         let (mut model, noise) = (self.solution.model.clone(), &self.solution.noise);
@@ -276,7 +253,7 @@ impl ModelFit<'_> {
         let model = Model { body_from_sensor, latency_s, own: None, ..model };
         let (_, pass) = pass_settled(&records, &selections, model, noise)?;
         let own = is_grouped_by_run.then_some(instrument);
-        Ok(PartEquations { number, equations: total(&pass.runs), own, measurements: records.measurements() })
+        Ok(PartEquations { run, equations: total(&pass.runs), own, measurements: records.measurements() })
     }
 
     /// Takes the scoring step of the parts' sum. Returns whether it was small enough for one step to be
@@ -312,12 +289,4 @@ impl ModelFit<'_> {
         self.parts = parts;
         Ok(is_near)
     }
-}
-
-const fn run_of(part: &Part) -> (usize, usize) {
-    (part.0, part.1)
-}
-
-fn next<T>(take: &Mutex<Receiver<T>>) -> Option<T> {
-    take.lock().unwrap_or_else(PoisonError::into_inner).recv().ok()
 }

@@ -47,6 +47,8 @@ pub struct FitOptions {
     pub max_steps: usize,
     /// Take every measurement, outliers too.
     pub ungated: bool,
+    /// Keep the innovations, most of the memory of a fit.
+    pub innovations: bool,
 }
 
 impl FitOptions {
@@ -60,6 +62,7 @@ impl FitOptions {
             ends: ConvergenceCriterion::NoiseShare(NOISE_STEP_TOLERANCE),
             max_steps: MAX_FIT_STEPS,
             ungated: false,
+            innovations: true,
         }
     }
 }
@@ -227,8 +230,12 @@ pub(crate) fn fit_from(
     }
     // After so small a step cached propagations are as good as integrated ones.
     let by = cached.as_ref().filter(|_| converged);
-    let pass_options =
-        PassOptions { innovations: true, gate: OutlierGate::of(options.ungated), by, ..PassOptions::default() };
+    let pass_options = PassOptions {
+        innovations: options.innovations,
+        gate: OutlierGate::of(options.ungated),
+        by,
+        ..PassOptions::default()
+    };
     let pass = pass(records, selections, &model, &noise, &headings, terms, pass_options);
     Ok(Solution { model, noise, free_headings: headings, pass, converged: converged || is_near, left_basin })
 }

@@ -34,8 +34,9 @@ use crate::thinning::{PropagationInterval, Selection};
 pub struct Pass {
     /// Each run's normal equation, in the order of sessions and runs; averaged over phases.
     pub runs: Vec<NormalEquations>,
-    /// The whitened innovations, phase by phase, in the order of segments and measurements.
-    pub innovations: Vec<Vec<InnovationComponent>>,
+    /// The whitened innovations, phase by phase, in the order of segments and measurements; most of the
+    /// memory, which copies of a pass share.
+    pub innovations: Arc<Vec<Vec<InnovationComponent>>>,
     /// How the robot moved before each measurement, phase by phase, in the order of the innovations; empty
     /// where it is not asked for.
     pub samples: Vec<Vec<KinematicSample>>,
@@ -71,7 +72,7 @@ impl Pass {
     pub(crate) fn nothing() -> Self {
         Self {
             runs: Vec::new(),
-            innovations: Vec::new(),
+            innovations: Arc::default(),
             samples: Vec::new(),
             outliers: Vec::new(),
             partial_outliers: Vec::new(),
@@ -135,6 +136,7 @@ pub(crate) fn pass(
     };
     let mut phases = Vec::with_capacity(selections.len());
     let mut outliers = Vec::with_capacity(selections.len());
+    let mut innovations_by_phase = Vec::new();
     // Of each run in the phase before, where this phase takes the same of it.
     let mut repeated: Vec<Option<Vec<OfSegment>>> = vec![None; runs.len()];
     for (phase, selection) in selections.iter().enumerate() {
@@ -232,7 +234,7 @@ pub(crate) fn pass(
         outliers.push(rejected);
         phases.push(cached);
         if pass_options.innovations {
-            result.innovations.push(innovations);
+            innovations_by_phase.push(innovations);
         }
         if pass_options.samples {
             result.samples.push(samples);
@@ -249,6 +251,7 @@ pub(crate) fn pass(
             result.partial_outliers = found;
         }
     }
+    result.innovations = Arc::new(innovations_by_phase);
     result.outliers = outliers.into_iter().next().unwrap_or_default();
     result.cached = pass_options.keep.then(|| CachedPropagation { model: model.clone(), phases });
     if let Some(own) = &model.own {

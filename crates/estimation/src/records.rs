@@ -61,6 +61,7 @@ impl<'a> Records<'a> {
             let gyro = LazyCell::new(|| GyroSettings::of(session));
             records.ids.push(session.runs.iter().map(|run| run.info().id.clone()).collect());
             for (position, run) in session.runs.iter().enumerate() {
+                session_m = run.run().session_m.unwrap_or(session_m);
                 let before = records.segments.len();
                 let mut has_partial = false;
                 if let Some(track) = WheelAngleInterpolator::of(run, session.robot) {

@@ -64,7 +64,7 @@ impl ModelFit<'_> {
     /// The fit without its innovations, most of its memory; [`Self::with_innovations`] finds them again.
     #[must_use]
     pub fn without_innovations(mut self) -> Self {
-        self.solution.pass.innovations = Vec::new();
+        self.solution.pass.innovations = Arc::default();
         self
     }
 

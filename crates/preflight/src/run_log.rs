@@ -1,6 +1,6 @@
 //! A run as the checks see it: wheel angles over time without impossible rows, and what the instrument saw.
 
-use dataset::{Displacement, NominalRobot, Protocol, Run, RunView, TruthSample, WheelLog};
+use dataset::{Displacement, NominalRobot, Protocol, Run, RunSpans, RunView, TruthSample, WheelLog};
 use kinematics::{Side, Wheels};
 
 use crate::settings::GYRO_TURN_SIGMA_RAD;
@@ -22,7 +22,7 @@ pub(crate) struct RunLog {
     /// Poses or positions.
     pub(crate) truth: Vec<TruthSample>,
     pub(crate) displacements: Vec<Displacement>,
-    /// Spans of the log and of the measurements, where both are of the same time ([`Run::spans_s`]), seconds.
+    /// Spans of the log and of the measurements, where both are of the same time ([`RunSpans::comparable_s`]), seconds.
     pub(crate) spans_s: Option<[f64; 2]>,
     /// What tapes, walls, returns and a gyroscope say of the motion between two instants.
     pub(crate) partial: Vec<PartialRow>,
@@ -109,7 +109,7 @@ impl RunLog {
             has_rates: matches!(odometry.wheels, WheelLog::Speeds(_) | WheelLog::Twist { .. }),
             truth,
             displacements: run.run().displacements.clone(),
-            spans_s: run.run().spans_s(),
+            spans_s: RunSpans::of(run.run()).comparable_s(),
             partial: partial(run.run()),
         })
     }

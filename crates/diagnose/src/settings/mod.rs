@@ -6,6 +6,7 @@
 
 pub(crate) mod carry_over;
 pub(crate) mod findings;
+pub(crate) mod large_log;
 pub(crate) mod levels;
 pub(crate) mod plan;
 pub(crate) mod records;

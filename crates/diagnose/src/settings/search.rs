@@ -37,6 +37,11 @@ pub(crate) const DECIMATION_STEP_S: f64 = 0.05;
 /// Derived: half of the outlier gate's χ² of three degrees of freedom, over its three components.
 pub(crate) const OUTLIER_COST: f64 = 0.5 * 25.9 / 3.0;
 
+/// Number. Refits of candidates that go on at a time.
+/// Budgeted: one needs 150 bytes a measurement beside what all share, and two occupy the cores where runs are
+/// few.
+pub(crate) const MAX_FITS_AT_A_TIME: usize = 2;
+
 /// Fraction of the measurements that the fit before took. A refit that takes fewer has diverged.
 /// Tuned: by hand; no record of what on.
 pub(crate) const MIN_TAKEN_FRACTION: f64 = 0.5;

@@ -7,7 +7,7 @@
 //! Alias: none.
 //! Reference: what importers meet; ROS headers in nanoseconds, Arduino's millis() and micros().
 
-use dataset::{Dataset, Odometry, Run, WheelLog};
+use dataset::{Dataset, Odometry, Run, RunSpans, WheelLog};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::Benchmark;
@@ -81,7 +81,7 @@ impl Forward for State {
 /// The log's span over that of the measurements, by the middle run.
 fn span_ratio(dataset: &Dataset) -> Option<f64> {
     let ratio = |run: &Run| {
-        let [logged_s, measured_s] = run.spans_s()?;
+        let [logged_s, measured_s] = RunSpans::of(run).comparable_s()?;
         Some(logged_s / measured_s)
     };
     median(dataset.runs.iter().filter_map(ratio).collect())
