@@ -4,8 +4,8 @@ use crate::record::Run;
 use crate::settings::MAX_ROW_S;
 
 impl Run {
-    /// Changes each instant of what was measured from outside. A gyroscope's are none of them: it rides on the
-    /// robot.
+    /// Changes each instant of what was measured from outside. A gyroscope's are none of them: it rides on
+    /// the robot.
     pub fn map_measurement_times(&mut self, mut map: impl FnMut(&mut f64)) {
         self.truth.iter_mut().for_each(|of| map(&mut of.t_s));
         self.headings.iter_mut().for_each(|of| map(&mut of.t_s));

@@ -22,7 +22,8 @@ pub(crate) struct RunLog {
     /// Poses or positions.
     pub(crate) truth: Vec<TruthSample>,
     pub(crate) displacements: Vec<Displacement>,
-    /// Spans of the log and of the measurements, where both are of the same time ([`RunSpans::comparable_s`]), seconds.
+    /// Spans of the log and of the measurements, where both are of the same time, seconds
+    /// ([`RunSpans::comparable_s`]).
     pub(crate) spans_s: Option<[f64; 2]>,
     /// What tapes, walls, returns and a gyroscope say of the motion between two instants.
     pub(crate) partial: Vec<PartialRow>,

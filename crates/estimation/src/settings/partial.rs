@@ -9,8 +9,8 @@ pub(crate) const GYRO_WINDOW_S: f64 = 1.0;
 /// Budgeted: beyond what any robot turns at, so that the bias counts as unknown however many runs there are.
 pub(crate) const GYRO_BIAS_SIGMA_RADPS: f64 = 10.0;
 
-/// Standard deviation of a gyroscope's relative scale of which nothing is stated: one that turns the other way
-/// is a fault of wheels or mounting, and none of scale.
+/// Standard deviation of a gyroscope's relative scale of which nothing is stated: one that turns the other
+/// way is a fault of wheels or mounting, and none of scale.
 /// Budgeted: twice the tenth that data sheets allow consumer sensors, and far too loose to determine a
 /// wheelbase.
 pub(crate) const GYRO_SCALE_SIGMA: f64 = 0.2;
