@@ -13,7 +13,7 @@ use statrs::distribution::{DiscreteCDF, Poisson};
 
 use crate::check::{Check, TestResult};
 use crate::settings::records::{
-    COUNT_ROUNDING, LOG_ROWS_LEVEL, MAX_CLOCK_RATIO, OUTLYING_ROW_PROBABILITY, OUTLYING_ROW_RANGES,
+    COUNT_ROUNDING, LOG_ROWS_LEVEL, MAX_CLOCK_RATIO, OUTLYING_ROW_PROBABILITY, OUTLYING_ROW_RANGES, RECURRENCE_ROWS,
     STANDSTILL_RATE_RATIO,
 };
 
@@ -108,7 +108,7 @@ fn of_column(t_s: &[f64], ticks: &[i64]) -> Rows {
         .map(|(t_s, ticks)| (t_s[1] - t_s[0], (ticks[1] - ticks[0]) as f64))
         .map(|(dt_s, counts)| (dt_s, counts / dt_s))
         .collect();
-    for window in rates.windows(6) {
+    for (first, window) in rates.windows(6).enumerate() {
         let (dt_s, rate) = window[2];
         let around = [window[0].1, window[1].1, window[4].1, window[5].1];
         let mean = around.iter().sum::<f64>() / 4.0;
@@ -117,11 +117,22 @@ fn of_column(t_s: &[f64], ticks: &[i64]) -> Rows {
         rows.all += 1;
         let uncertain = ((most - least) * dt_s).max(COUNT_ROUNDING).max(mean.abs() * apart_s);
         let is_standing = rate.abs() < STANDSTILL_RATE_RATIO * mean.abs() || mean == 0.0;
-        if !is_standing && ((rate - mean) * dt_s).abs() > OUTLYING_ROW_RANGES * uncertain {
+        let is_outlying = !is_standing && ((rate - mean) * dt_s).abs() > OUTLYING_ROW_RANGES * uncertain;
+        if is_outlying && !recurs(&rates, first + 2, mean) {
             rows.outlying += 1;
         }
     }
     rows
+}
+
+/// Is an increment as far off a mean rate as another one nearby is? A wheel whose speed has a ripple of four
+/// or five rows goes off alike each time, and rows two and three away are all of another phase. The next
+/// increment gives back what was outlying.
+fn recurs(rates: &[(f64, f64)], row: usize, mean: f64) -> bool {
+    let off = rates[row].1 - mean;
+    let before = row.saturating_sub(RECURRENCE_ROWS)..row;
+    let after = row + 2..(row + RECURRENCE_ROWS + 2).min(rates.len());
+    before.chain(after).any(|other| (rates[other].1 - mean) * off.signum() > 0.5 * off.abs())
 }
 
 #[cfg(test)]
@@ -151,6 +162,26 @@ mod tests {
         for jitter_s in [0.0, 1e-3, 5e-3, 9e-3] {
             let (t_s, ticks) = column(jitter_s);
             assert_eq!(of_column(&t_s, &ticks), Rows { all: 394, outlying: 0 }, "{jitter_s}");
+        }
+    }
+
+    #[test]
+    fn a_ripple_of_some_rows_is_no_outlying_row() {
+        let t_s: Vec<f64> = (0..400).map(|row| 0.05 * f64::from(row)).collect();
+        for pattern in [&[1481, 1482, 1527, 1510][..], &[1481, 1481, 1540, 1482, 1481], &[1500, 1620]] {
+            let mut sum = 0;
+            let mut counted = |row: usize| {
+                sum += pattern[row % pattern.len()];
+                sum
+            };
+            let mut ticks: Vec<i64> = (0..400).map(&mut counted).collect();
+            assert_eq!(of_column(&t_s, &ticks).outlying, 0, "{pattern:?}");
+            if pattern.len() > 2 {
+                // On a row in which the ripple is alike around it.
+                let row = (0..pattern.len()).find(|row| pattern[*row] > 1520).expect("a peak") + 40 * pattern.len();
+                ticks[row] += 4096;
+                assert_eq!(of_column(&t_s, &ticks).outlying, 1, "{pattern:?}");
+            }
         }
     }
 

@@ -163,6 +163,10 @@ pub(crate) const MIN_MEASUREMENTS_PER_RUN: f64 = 3.0;
 /// Tuned: by hand; no record of what on.
 pub(crate) const OUTLYING_ROW_RANGES: f64 = 20.0;
 
+/// Rows before and after an increment among which another one as far off says that it is of the motion.
+/// Budgeted: rows two and three away are of one phase where a ripple lasts four or five rows.
+pub(crate) const RECURRENCE_ROWS: usize = 5;
+
 /// Probability. An increment of a steady wheel is outlying.
 /// Derived: 0.13 r³ at r = 1/20, the distribution of the range of four normal variables.
 pub(crate) const OUTLYING_ROW_PROBABILITY: f64 = 1.6e-5;
