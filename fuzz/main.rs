@@ -228,7 +228,7 @@ fn regress_a_fit_that_determines_nothing_in_a_distorted_map_ends_no_process() {
     mended("diagnosis", &[40_000_027, 40_000_145]);
 }
 
-/// Ticks of an axis over the smallest doubles began at the power i32::MIN.
+/// An axis of logarithms over the smallest doubles began at zero, and its ticks at the power i32::MIN.
 #[test]
 fn regress_a_figure_of_the_smallest_doubles_has_ticks() {
     mended("sweep-state", &[200_002_179]);

@@ -142,7 +142,8 @@ impl Scale {
     fn value(self, position: f64) -> f64 {
         match self {
             Self::Linear => position,
-            Self::Log => 10_f64.powf(position),
+            // Space below the smallest doubles is none: their logarithm would be infinite.
+            Self::Log => 10_f64.powf(position).max(f64::MIN_POSITIVE),
         }
     }
 }
@@ -203,6 +204,13 @@ mod tests {
         assert_eq!(axis.span(&[0.0, 0.0], true), Span { low: 0.0, high: 1.0, scale: Scale::Linear });
         let span = axis.scale(Scale::Log).span(&[5.0], false);
         assert!(span.low < 5.0 && span.high > 5.0);
+    }
+
+    #[test]
+    fn a_logarithmic_span_of_the_smallest_doubles_is_positive() {
+        let span = Axis::new("x", "m").scale(Scale::Log).span(&[5e-324, 1e-300], false);
+        assert!(span.low >= f64::MIN_POSITIVE && span.high > 1e-300, "{span:?}");
+        assert!(span.fraction(1e-300).is_finite());
     }
 
     #[test]
