@@ -141,6 +141,8 @@ const FAULTS: &[(&str, Change, &str)] = &[
     ("truth 0.4 s late", |of| of.latency_s = 0.4, "truth_latency"),
     ("truth 0.3 s late in one run", |of| of.late_run = Some((6, 0.3)), "truth_latency"),
     ("truth 100 ms late", |of| of.latency_s = 0.1, "truth_latency"),
+    // Not normal, and no large errors: neither bumps nor outliers.
+    ("uniform errors of the instrument", |of| of.has_uniform_errors = true, "unlisted"),
 ];
 
 #[test]

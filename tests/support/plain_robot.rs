@@ -54,6 +54,8 @@ pub(crate) struct PlainRobot {
     pub(crate) truth_between_rows: f64,
     pub(crate) truth_sigma_m: f64,
     pub(crate) truth_sigma_rad: f64,
+    /// Errors of poses are uniform, of the same standard deviations.
+    pub(crate) has_uniform_errors: bool,
     pub(crate) reports: Reports,
     /// The pose that is reported is so old, seconds.
     pub(crate) latency_s: f64,
@@ -87,6 +89,7 @@ impl PlainRobot {
             truth_between_rows: 0.0,
             truth_sigma_m: 1e-3,
             truth_sigma_rad: 1e-3,
+            has_uniform_errors: false,
             reports: Reports::Poses,
             latency_s: 0.0,
             late_run: None,
@@ -211,8 +214,13 @@ impl PlainRobot {
         for step in steps {
             let at = (step as f64 - 1000.0 * off_s).round().clamp(0.0, last as f64) as usize;
             let [x_m, y_m, theta_rad] = self.seen(number, 1e-3 * step as f64, path.samples[at].at, &mut jumped_at);
-            let (x_m, y_m) = (x_m + self.truth_sigma_m * draws.normal(), y_m + self.truth_sigma_m * draws.normal());
-            let theta_rad = theta_rad + self.truth_sigma_rad * draws.normal();
+            let mut error = |sigma: f64| {
+                let standard =
+                    if self.has_uniform_errors { 12_f64.sqrt() * (draws.uniform() - 0.5) } else { draws.normal() };
+                sigma * standard
+            };
+            let (x_m, y_m) = (x_m + error(self.truth_sigma_m), y_m + error(self.truth_sigma_m));
+            let theta_rad = theta_rad + error(self.truth_sigma_rad);
             let theta = if self.reports == Reports::Positions { String::new() } else { format!("{theta_rad:.9}") };
             writeln!(truth, "{id},{:.6},{x_m:.9},{y_m:.9},{theta}", 1e-3 * step as f64).expect("text");
         }

@@ -27,6 +27,9 @@ use crate::settings::residuals::{
 };
 use crate::statistics::{p_of_chi_square, p_of_z};
 
+/// Kurtosis of a normal variable.
+const NORMAL_KURTOSIS: f64 = 3.0;
+
 /// Scatter that failed checks show.
 pub(crate) fn scatter(structure: &MeanStructure<'_>, without_ids: &[String]) -> Vec<Finding> {
     let mut findings = Vec::new();
@@ -73,7 +76,8 @@ pub(crate) fn scatter(structure: &MeanStructure<'_>, without_ids: &[String]) -> 
         let has_outliers = outliers.p_value < NOISE_EFFECT_LEVEL && (outliers.persistent > 0 || !has_successors);
         let heaviest = tails.into_iter().max_by(|a, b| kurtosis(a.0).total_cmp(&kurtosis(b.0)));
         let jump = heaviest.and_then(|(component, number, sign)| {
-            let fails = test(component).filter(|test| !test.passes);
+            // Tails that are lighter than normal ones are no large errors.
+            let fails = test(component).filter(|test| !test.passes && test.statistic > NORMAL_KURTOSIS);
             let p_value = fails.map(|test| test.p_value).or(has_outliers.then_some(outliers.p_value))?;
             Some((p_value, residual_persistence(&structure.found.model, number), sign))
         });
