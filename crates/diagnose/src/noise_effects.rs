@@ -24,11 +24,9 @@ use crate::run_to_run::differs_from_run_to_run;
 use crate::settings::levels::TURN_SCATTER_LEVEL;
 use crate::settings::residuals::{
     DEPENDENCE_BEYOND_TAILS_LEVEL, ISOLATED_TO_PERSISTENT_RATIO, MAX_OUTLIER_FRACTION, NOISE_EFFECT_LEVEL,
+    NORMAL_KURTOSIS,
 };
 use crate::statistics::{p_of_chi_square, p_of_z};
-
-/// Kurtosis of a normal variable.
-const NORMAL_KURTOSIS: f64 = 3.0;
 
 /// Scatter that failed checks show.
 pub(crate) fn scatter(structure: &MeanStructure<'_>, without_ids: &[String]) -> Vec<Finding> {

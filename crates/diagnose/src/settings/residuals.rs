@@ -48,6 +48,10 @@ pub(crate) const MIN_WHITENESS_INNOVATIONS: f64 = 20.0;
 /// Tuned: by hand; no record of what on.
 pub(crate) const MIN_WHITENESS_PAIRS: f64 = 10.0;
 
+/// Number. Kurtosis above which tails are heavy.
+/// Derived: that of a normal variable.
+pub(crate) const NORMAL_KURTOSIS: f64 = 3.0;
+
 /// Number. The tails of fewer innovations are not tested.
 /// Tuned: by hand; no record of what on.
 pub(crate) const MIN_KURTOSIS_INNOVATIONS: f64 = 50.0;
