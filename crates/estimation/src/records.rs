@@ -16,8 +16,7 @@ use crate::noise_shape::NoiseShape;
 use crate::partial_records::{GyroSettings, PartialSegment, partial_segments};
 use crate::poses_between_rows::take_one_for_each_row;
 use crate::segment::{MeasuredPose, Segment, Start};
-use crate::settings::GYRO_SCALE_SIGMA;
-use crate::settings::{AUTOCORRELATION_DECAY, MIN_CHORD_RATIO, TIME_TOLERANCE_S};
+use crate::settings::{AUTOCORRELATION_DECAY, GYRO_SCALE_SIGMA, MIN_CHORD_RATIO, TIME_TOLERANCE_S};
 use crate::wheel_angles::{WheelAngleInterpolator, WheelInterval};
 
 /// All that sessions hold for the likelihood.

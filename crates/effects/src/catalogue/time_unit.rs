@@ -92,27 +92,16 @@ const TYPICAL_SPEED_M_S: f64 = 0.3;
 
 /// How far, in logarithms, the robot's mean speed by its log is from a usual robot's.
 fn off_typical(dataset: &Dataset) -> f64 {
-    let robot = &dataset.robot;
-    let m_per_rad = 0.25 * (robot.left_wheel_diameter_m + robot.right_wheel_diameter_m);
+    let session = dataset.session();
     let (mut distance_m, mut time_s) = (0.0, 0.0);
-    for Odometry { t_s, wheels, .. } in dataset.runs.iter().map(|run| &run.odometry) {
-        let length_s = t_s.last().zip(t_s.first()).map_or(0.0, |(last, first)| last - first);
-        let turned_rad = match wheels {
-            WheelLog::Ticks(ticks) => {
-                let counted =
-                    |column: &[i64]| column.windows(2).map(|pair| pair[1].abs_diff(pair[0])).sum::<u64>() as f64;
-                let rad = robot.ticks_per_rev.map_or(0.0, |ticks_per_rev| std::f64::consts::TAU / ticks_per_rev);
-                0.5 * rad * (counted(&ticks.left) + counted(&ticks.right))
-            }
-            WheelLog::Angles(angles) => {
-                let turned = |column: &[f64]| column.windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum::<f64>();
-                0.5 * (turned(&angles.left) + turned(&angles.right))
-            }
+    for run in &session.runs {
+        let Odometry { t_s, wheels, .. } = &run.run().odometry;
+        if matches!(wheels, WheelLog::Speeds(_) | WheelLog::Twist { .. }) {
             // Speeds are logged: the same whatever the unit of time.
-            WheelLog::Speeds(_) | WheelLog::Twist { .. } => return 0.0,
-        };
-        distance_m += m_per_rad * turned_rad;
-        time_s += length_s;
+            return 0.0;
+        }
+        distance_m += run.rolled_m(session.robot);
+        time_s += t_s.last().zip(t_s.first()).map_or(0.0, |(last, first)| last - first);
     }
     if distance_m > 0.0 && time_s > 0.0 { (distance_m / time_s / TYPICAL_SPEED_M_S).ln().abs() } else { 0.0 }
 }
