@@ -90,6 +90,19 @@ fn other_units_are_named_and_mended() {
 }
 
 #[test]
+fn rows_that_are_received_together_are_not_taken_for_lost_ones() {
+    let temp = tempfile::tempdir().expect("a temporary folder");
+    // Five rows at once, ten times a second.
+    let together = |t_s: &mut f64, _: &mut [f64; 2]| {
+        let received_s = 0.1 * (*t_s / 0.1 - 1e-6).ceil();
+        *t_s = received_s - 5e-3 * (received_s - *t_s);
+    };
+    good(15).rows(together).write(&temp.path().join("set"), "");
+    let found = problems(temp.path(), "set");
+    assert!(found.iter().all(|(id, ..)| id != "lost_rows" && id != "gap"), "{found:?}");
+}
+
+#[test]
 fn clocks_that_are_apart_are_named_and_mended() {
     for offset_s in [3.0, 100.0, -100.0] {
         refused(&good(12).truths(|t_s, _| *t_s += offset_s), "clock_offset", true);

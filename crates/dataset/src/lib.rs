@@ -48,6 +48,7 @@ pub use partial::{GyroNoise, GyroSample, HeadingReading, LidarExtrinsics, Revisi
 pub use pose_covariance::PoseCovariance;
 pub use prefetch::read_ahead;
 pub use read::{Blocks, Loaded, RunByRun, read};
+pub use receipt_delays::has_bunched_rows;
 pub use record::{
     CovarianceScale, Dataset, Displacement, ExtraChannel, MarkedPoint, NominalRobot, Odometry, PointReading, Protocol,
     ProtocolSettings, Provenance, Run, RunInfo, TruthNoise, TruthSample, TruthSigma, UnknownMotion, WheelLog,

@@ -20,6 +20,9 @@ const LOST: [f64; 17] =
 const LOST_STEPS: [f64; 2] = [1.25e-3, 3e-4];
 /// Log odds against rows that are lost or came between ticks at all.
 const LOST_COST: f64 = 8.0;
+/// Mean of the share of rows that are lost, which falls off exponentially: where delays are beats long, rows tell
+/// hardly more than that some are.
+const USUAL_LOST: f64 = 0.01;
 /// Probability of a step of one beat at a row, in either direction, where none is expected.
 const MIN_STEPS: f64 = 3e-4;
 /// Rows by which the share is found.
@@ -244,13 +247,7 @@ pub(crate) struct Received {
 impl Received {
     /// By stamps that do not fall; `None` where rows do not hold up each other.
     pub(crate) fn of(t_s: &[f64]) -> Option<Self> {
-        let gap_s = slope_s(t_s)?;
-        let is_held_up = |pair: &[f64]| pair[1] - pair[0] < HELD_UP_GAP * gap_s;
-        let count = t_s.windows(2).filter(|pair| is_held_up(pair)).count();
-        if count as f64 <= MIN_HELD_UP_SHARE * (t_s.len() - 1) as f64 {
-            return None;
-        }
-        let held_up: Vec<bool> = std::iter::once(false).chain(t_s.windows(2).map(is_held_up)).collect();
+        let (gap_s, held_up) = bunches(t_s)?;
         let rows = |lost: f64, most: usize| {
             let period_s = gap_s / (1.0 + lost);
             let late = (0..most).map(|row| (t_s[row] - t_s[0]) / period_s - row as f64).collect();
@@ -269,15 +266,16 @@ impl Received {
         if mean * (1.0 / MEANS_PER_E).exp() > MAX_MEAN {
             return None;
         }
+        // Densities are per beat, and beats differ: per second they compare.
+        let by_themselves = held_up[..most].iter().filter(|held_up| !**held_up).count() as f64;
         let log_odds = |lost: f64| {
-            let cost = if lost == 0.0 { 0.0 } else { LOST_COST };
-            Delays::of(mean, lost).blocks(&rows(lost, most)).0 - cost
+            let cost = if lost == 0.0 { 0.0 } else { LOST_COST + lost.abs() / USUAL_LOST };
+            Delays::of(mean, lost).blocks(&rows(lost, most)).0 + by_themselves * (1.0 + lost).ln() - cost
         };
         let odds = LOST.map(|lost| (lost, log_odds(lost)));
         let lost = odds.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0.0, |(lost, _)| lost);
         let lost = likeliest(lost, LOST_STEPS, log_odds);
         let (all, period_s) = (rows(lost, t_s.len()), gap_s / (1.0 + lost));
-        let mean = likeliest_mean(mean, lost, &rows(lost, most));
         let of_rows = Delays::of(mean, lost).smoothed(&all);
         let read = |(row, s): (usize, f64)| t_s[0] + period_s * (row as f64 + s);
         Some(Self { period_s, read_s: of_rows.into_iter().enumerate().map(read).collect() })
@@ -292,6 +290,22 @@ impl Received {
         };
         self.read_s.iter().map(number).collect()
     }
+}
+
+/// Whether rows come in bunches, so that their stamps are those of receipt and single gaps say nothing of rows that
+/// are missing.
+#[must_use]
+pub fn has_bunched_rows(t_s: &[f64]) -> bool {
+    t_s.len() > 1 && bunches(t_s).is_some()
+}
+
+/// Time from row to row, and which rows came on the heels of the one before; `None` where hardly any did.
+fn bunches(t_s: &[f64]) -> Option<(f64, Vec<bool>)> {
+    let gap_s = slope_s(t_s)?;
+    let is_held_up = |pair: &[f64]| pair[1] - pair[0] < HELD_UP_GAP * gap_s;
+    let held_up: Vec<bool> = std::iter::once(false).chain(t_s.windows(2).map(is_held_up)).collect();
+    let count = held_up.iter().filter(|held_up| **held_up).count();
+    (count as f64 > MIN_HELD_UP_SHARE * (t_s.len() - 1) as f64).then_some((gap_s, held_up))
 }
 
 /// The likeliest value from a first one on, by steps that halve (Hooke & Jeeves 1961).
@@ -379,6 +393,14 @@ mod tests {
         assert!((found.period_s / PERIOD_S - 1.0).abs() < 1e-3, "{}", found.period_s);
         // The share of lost rows is found in steps of 3e-4: a beat of 4000.
         assert!(found.numbers().last().is_some_and(|last| (last - 3999).abs() <= 1));
+    }
+
+    #[test]
+    fn rows_that_are_lost_among_delays_of_many_beats_leave_the_beat() {
+        let found = found(&received(6000, 0.023, 5.0, due_s));
+        // Rejects beats compared by densities a beat, of which the longest was the likeliest: none without an end.
+        assert!((found.period_s / PERIOD_S - 1.0).abs() < 0.03, "{}", found.period_s);
+        assert!(found.numbers().last().is_some_and(|last| (last - 5999).abs() < 180));
     }
 
     #[test]

@@ -56,7 +56,7 @@ pub struct SamplingPeriod {
     /// For each row, which tick it is of; 0 for the first.
     pub numbers: Vec<i64>,
     /// For each row, how late its stamp is, seconds: against the line through the rows around it; where rows
-    /// hold up each other, against when it was read.
+    /// hold up each other, against when it was read. 0 of a row that came by itself: no tick says when.
     pub late_s: Vec<f64>,
     /// Whether rows come in bunches: they are stamped on receipt, and one that is late holds up those behind
     /// it.
@@ -84,7 +84,10 @@ impl SamplingPeriod {
                 found.settled(t_s)
             }
         };
-        let late_s = lateness(t_s, &numbers, period_s);
+        let mut late_s = lateness(t_s, &numbers, period_s);
+        for row in by_themselves(&numbers, &late_s) {
+            late_s[row] = 0.0;
+        }
         Some(Self { period_s, numbers, late_s, is_bunched: false })
     }
 
@@ -291,6 +294,19 @@ fn lateness(t_s: &[f64], numbers: &[i64], period_s: f64) -> Vec<f64> {
     (0..rows).map(late).collect()
 }
 
+/// Rows that came by themselves: of several with one number all but the nearest to its tick.
+fn by_themselves(numbers: &[i64], late_s: &[f64]) -> Vec<usize> {
+    let mut found = Vec::new();
+    let mut first = 0;
+    for of_tick in numbers.chunk_by(|number, next| number == next) {
+        let rows = first..first + of_tick.len();
+        first = rows.end;
+        let nearest = rows.clone().min_by(|a, b| late_s[*a].abs().total_cmp(&late_s[*b].abs()));
+        found.extend(rows.filter(|row| Some(*row) != nearest));
+    }
+    found
+}
+
 /// Sums of a line through points.
 #[derive(Default)]
 struct Sums {
@@ -425,6 +441,10 @@ mod tests {
         let (sum_s, count) =
             of_ticks.fold((0.0, 0.0), |(sum, count), (read_s, due_s)| (sum + read_s - due_s, count + 1.0));
         assert!((sum_s / count).abs() < 0.01 * PERIOD_S, "{}", sum_s / count);
+        // No tick says when they were read: their distance to one is no lateness.
+        let is_between = |due_s: f64| (0.3..0.5).contains(&(due_s / PERIOD_S).fract());
+        let between = found.late_s.iter().zip(&due_s).filter(|(_, due_s)| is_between(**due_s));
+        assert_eq!(between.map(|(late_s, _)| *late_s).collect::<Vec<_>>(), vec![0.0; 100]);
     }
 
     #[test]

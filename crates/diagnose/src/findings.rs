@@ -21,7 +21,7 @@ use crate::record_faults::{Fault, wrong_wheels};
 use crate::settings::findings::DEPENDENCE_BEYOND_NOISE_LEVEL;
 use crate::settings::levels::MAX_EFFECTS;
 use crate::sparse_terms::{UncataloguedTerms, lack_of_fit};
-use crate::stamp_errors::StampError;
+use crate::stamp_errors::{StampError, have_uncertain_rows};
 use crate::unknown_motion::Anomaly;
 use crate::wald::wald_test;
 
@@ -252,10 +252,15 @@ fn without_errors_of_the_map(results: &StageResults<'_, '_>, mut findings: Vec<F
     findings
 }
 
-/// Stamps that were set right only roughly leave errors that no term is of. Where something that is in no
-/// catalogue explains the data as well as what was found, that is what they left.
+/// Stamps that were set right only roughly, or that a term explains which does not know of which tick all rows are,
+/// leave errors that no term is of. Where something that is in no catalogue explains the data as well as what was
+/// found, that is what they left.
 fn without_remainders_of_stamps(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
-    if results.stamps.is_some_and(|stamps| stamps.is_undone_roughly) {
+    let are_rough = match results.stamps {
+        Some(stamps) => stamps.is_undone_roughly,
+        None => findings.iter().any(Finding::is_of_stamps) && have_uncertain_rows(results.recorded),
+    };
+    if are_rough {
         findings.retain(|finding| finding.is_of_stamps() || !finding.has_unlisted());
     }
     findings

@@ -47,7 +47,7 @@ impl StampError {
 }
 
 /// Whether stamps do not tell in some run of which tick each row is.
-fn have_uncertain_rows(datasets: &[Dataset]) -> bool {
+pub(crate) fn have_uncertain_rows(datasets: &[Dataset]) -> bool {
     let is_uncertain = |run: &Run| SamplingPeriod::of(&run.odometry.t_s).is_some_and(|period| !period.is_certain());
     datasets.iter().flat_map(|dataset| &dataset.runs).any(is_uncertain)
 }

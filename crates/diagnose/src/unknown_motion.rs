@@ -14,10 +14,10 @@ use kinematics::{Pose, wrap_to_pi};
 
 use crate::pose_windows::{CalibratedTracks, PoseTrack, Residual};
 use crate::settings::records::{
-    IMPLAUSIBLE_SPEED_RATIO, LASTING_SHARE, MAX_LEAST_EXTRINSICS, MAX_UNKNOWN_EVENTS_PER_RUN, MAX_UNKNOWN_SHARE,
-    MIN_EXTRINSICS, MIN_OTHER_EXTRINSICS_RAD, MIN_OTHER_EXTRINSICS_SEPARATIONS, MIN_OTHER_EXTRINSICS_SIGMAS,
-    MIN_RUNS_PER_ODD_CLOCK, MIN_UNKNOWN_ACROSS_SEPARATIONS, MIN_UNKNOWN_ALONG_SEPARATIONS, MIN_UNKNOWN_SIGMAS,
-    MIN_UNKNOWN_TURN_RAD, MIN_WINDOW_SIGMA, WINDOW_SPANS,
+    IMPLAUSIBLE_SPEED_RATIO, LASTING_SHARE, MAX_LEAST_EXTRINSICS, MAX_UNDONE_S, MAX_UNKNOWN_EVENTS_PER_RUN,
+    MAX_UNKNOWN_SHARE, MIN_EXTRINSICS, MIN_OTHER_EXTRINSICS_RAD, MIN_OTHER_EXTRINSICS_SEPARATIONS,
+    MIN_OTHER_EXTRINSICS_SIGMAS, MIN_RUNS_PER_ODD_CLOCK, MIN_SURROUNDING_SIGMAS, MIN_UNKNOWN_ACROSS_SEPARATIONS,
+    MIN_UNKNOWN_ALONG_SEPARATIONS, MIN_UNKNOWN_SIGMAS, MIN_UNKNOWN_TURN_RAD, MIN_WINDOW_SIGMA, WINDOW_SPANS,
 };
 
 /// What does not belong, where, and by how much.
@@ -154,11 +154,42 @@ impl Limits {
 
     /// Standard deviations of a residual that is beyond wheels.
     fn excess(&self, residual: &Residual, sigma: &Residual) -> Option<f64> {
+        self.excess_of(residual, sigma, MIN_UNKNOWN_SIGMAS)
+    }
+
+    /// The same where it takes so many.
+    fn excess_of(&self, residual: &Residual, sigma: &Residual, least: f64) -> Option<f64> {
         let exceeds = |axis: usize| {
             let z = residual[axis].abs() / sigma[axis];
-            (residual[axis].abs() > self.least[axis] && z > MIN_UNKNOWN_SIGMAS).then_some(z)
+            (residual[axis].abs() > self.least[axis] && z > least).then_some(z)
         };
         (0..3).filter_map(exceeds).max_by(f64::total_cmp)
+    }
+
+    /// Whether the residual of a window around a displacement has it still.
+    fn shows(&self, displacement: &Residual, residual: &Residual) -> bool {
+        let (left, place_m) = (residual - displacement, displacement.x.hypot(displacement.y).max(self.least.y));
+        left.x.hypot(left.y) < 0.5 * place_m && left.z.abs() < 0.5 * displacement.z.abs().max(self.least.z)
+    }
+
+    /// Longer windows around a displacement, while they would show it. Rows that are stamped late let counts fall
+    /// behind over as long as they are late, and catch up at once: what came at once is undone by what was before.
+    fn surrounding<'a>(
+        &'a self,
+        calibrated: &'a CalibratedTracks<'_>,
+        track: usize,
+        (from, to): (usize, usize),
+        displacement: &'a Residual,
+    ) -> impl Iterator<Item = (usize, usize)> + 'a {
+        let of = &calibrated.tracks[track];
+        let longer = WINDOW_SPANS.into_iter().map(move |poses| (from.checked_sub(poses), to + poses));
+        let within = move |(before, after): &(usize, usize)| {
+            let around_s = (of.t_s[from] - of.t_s[*before]).max(of.t_s[*after] - of.t_s[to]);
+            let sigma = WINDOW_SPANS.iter().zip(&self.sigmas).find(|(span, _)| **span >= after - before);
+            around_s < MAX_UNDONE_S
+                && sigma.is_some_and(|(_, sigma)| self.excess_of(displacement, sigma, MIN_SURROUNDING_SIGMAS).is_some())
+        };
+        longer.filter_map(move |(before, after)| Some((before?, after)).filter(|_| after < of.len())).take_while(within)
     }
 
     /// The stretches of one track that are beyond wheels, with the instrument somewhere on the robot: by the
@@ -194,12 +225,10 @@ impl Limits {
                 // Outliers are undone by the next measurement: those before and after it say the same.
                 let Some(before) = window.0.checked_sub(1).filter(|_| window.1 + 1 < of_track) else { continue };
                 let others = [(before, window.1), (window.0, window.1 + 1), (before, window.1 + 1)];
-                let agrees = |other: (usize, usize)| {
-                    let seen = calibrated.residual_of(sensor, track, other) - displacement;
-                    let place_m = displacement.x.hypot(displacement.y).max(self.least.y);
-                    seen.x.hypot(seen.y) < 0.5 * place_m && seen.z.abs() < 0.5 * displacement.z.abs().max(self.least.z)
-                };
-                if !others.into_iter().all(agrees) {
+                let agrees = |other| self.shows(&displacement, &calibrated.residual_of(sensor, track, other));
+                if !others.into_iter().all(agrees)
+                    || !self.surrounding(calibrated, track, window, &displacement).all(agrees)
+                {
                     continue;
                 }
                 let is_frame = is_step && is_too_fast(calibrated, track, window, &displacement);
@@ -347,6 +376,8 @@ mod tests {
         Outlier(Pose, usize),
         /// The instrument is elsewhere on the robot.
         Elsewhere(Pose),
+        /// So many rows up to the hundredth wait, and are stamped with it.
+        RowsWait(usize),
     }
 
     /// Eight runs of 20 s with turns both ways and measurements that round to a millimetre; something happens
@@ -355,6 +386,10 @@ mod tests {
         let extrinsics = Pose::new(0.05, 0.02, 0.1);
         let run = |number: usize| {
             let happens = happens.filter(|_| number == 3);
+            let stamp_s = |row: usize| match happens {
+                Some(Happens::RowsWait(rows)) if (101 - rows..=100).contains(&row) => 10.0 - 1e-4 * (100 - row) as f64,
+                _ => 0.1 * row as f64,
+            };
             let (mut pose, mut frame) = (Pose::new(0.3, -0.2, 0.7), Pose::IDENTITY);
             let (mut turns, mut truth) = (Wheels::both(vec![0.0]), Vec::new());
             for row in 0..=200_usize {
@@ -390,7 +425,7 @@ mod tests {
             Run {
                 info: RunInfo { id: format!("run-{number}"), continuous: true, ..RunInfo::default() },
                 odometry: Odometry {
-                    t_s: (0..=200).map(|row| 0.1 * f64::from(row)).collect(),
+                    t_s: (0..=200).map(stamp_s).collect(),
                     wheels: WheelLog::Angles(turns),
                     ..Odometry::default()
                 },
@@ -423,6 +458,10 @@ mod tests {
         for row in [0, 1, 100, 199, 200] {
             let outlier = Happens::Outlier(Pose::new(0.5, 0.3, 0.4), row);
             assert!(unknown_motions(&[driven(Some(outlier))], 0.0).is_none(), "row {row}");
+        }
+        // Counts fall behind over half a second, 0.1 m at the most, and catch up within a row.
+        for rows in [2, 4, 5] {
+            assert!(unknown_motions(&[driven(Some(Happens::RowsWait(rows)))], 0.0).is_none(), "{rows} rows");
         }
         // Below what wheels can miss.
         assert!(unknown_motions(&[driven(Some(Happens::Carried(Pose::new(0.01, 0.0, 0.02), 1)))], 0.0).is_none());

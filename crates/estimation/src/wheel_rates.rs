@@ -10,8 +10,9 @@
 use kinematics::Wheels;
 
 use crate::settings::{
-    GAP_RATIO, GENTLE_ACCELERATION_M_S2, MAX_EXACT_JITTER, MAX_ROW_RATE_NOISE, MAX_STEADY_ROW_S, MIN_GRID_FRACTION,
-    MIN_GRID_STEPS, MIN_QUANTUM_RAD, QUANTUM_TOLERANCE, RATE_NOISE_FRACTION, RATE_WINDOWS,
+    GAP_RATIO, GENTLE_ACCELERATION_M_S2, MAX_EXACT_JITTER, MAX_ROUNDING_S, MAX_ROW_RATE_NOISE, MAX_STEADY_ROW_S,
+    MIN_BEAT_JITTER, MIN_GRID_FRACTION, MIN_GRID_STEPS, MIN_QUANTUM_RAD, QUANTUM_TOLERANCE, RATE_NOISE_FRACTION,
+    RATE_WINDOWS,
 };
 
 /// Rates at the rows of a run.
@@ -248,7 +249,8 @@ fn pieces(t_s: &[f64], continuous: bool) -> Vec<std::ops::Range<usize>> {
 /// Do a log's stamps jitter by more than what numbers in a file are rounded by?
 pub(crate) fn are_inexact(t_s: &[f64]) -> bool {
     let row_s = median(t_s.windows(2).map(|pair| pair[1] - pair[0])).unwrap_or(0.0);
-    stamp_jitter_s(t_s) > MAX_EXACT_JITTER * row_s
+    let of_a_file_s = MAX_ROUNDING_S.max(MIN_BEAT_JITTER * row_s);
+    stamp_jitter_s(t_s) > of_a_file_s.min(MAX_EXACT_JITTER * row_s)
 }
 
 /// Standard deviation of the errors of a log's stamps, seconds: of second differences, which even rows do not

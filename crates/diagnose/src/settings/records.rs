@@ -220,6 +220,14 @@ pub(crate) const MIN_UNKNOWN_TURN_RAD: f64 = 0.1;
 /// Convention: beyond what normal errors do in any log.
 pub(crate) const MIN_UNKNOWN_SIGMAS: f64 = 10.0;
 
+/// Standard deviations of a longer window that a displacement has to be, for the window to tell whether it lasts.
+/// Derived: half of it is asked for, which is then four standard deviations.
+pub(crate) const MIN_SURROUNDING_SIGMAS: f64 = 8.0;
+
+/// Seconds before and after a displacement in which it may be undone: rows that are stamped late catch up.
+/// Budgeted: ten times the mean lateness of rows that a busy computer receives, 50 ms.
+pub(crate) const MAX_UNDONE_S: f64 = 0.5;
+
 /// Share of all pairs of measurements. Where more are beyond the wheels, the noise is, or the model.
 /// Convention: a tenth.
 pub(crate) const MAX_UNKNOWN_SHARE: f64 = 0.1;

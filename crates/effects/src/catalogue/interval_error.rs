@@ -141,8 +141,7 @@ fn restamped(dataset: &Dataset, share: f64, sigma: f64) -> Option<Dataset> {
 }
 
 /// When rows were read that have these stamps, and which rows say when. A row of a tick was read nearer to
-/// the beat by the false share. Of several rows of one tick the nearest is the tick's; the others came by
-/// themselves, with no beat to say when but their stamps. Where stamps are later than a tick can be told by,
+/// the beat by the false share; one that came by itself has no beat to say when but its stamp. Where stamps are later than a tick can be told by,
 /// none of them says when.
 fn read_times(stamps_s: &[f64], share: f64, sigma: f64) -> Option<(Vec<f64>, Vec<bool>)> {
     if share <= 0.0 {
@@ -150,17 +149,15 @@ fn read_times(stamps_s: &[f64], share: f64, sigma: f64) -> Option<(Vec<f64>, Vec
     }
     let share = if (share - 1.0).abs() <= WHOLE_SHARE_SIGMAS * sigma { 1.0 } else { share.min(1.0) };
     let period = SamplingPeriod::of(stamps_s)?;
-    let (mut late_s, mut says) = (period.late_s.clone(), vec![true; stamps_s.len()]);
-    let mut first = 0;
-    for of_tick in period.numbers.chunk_by(|number, next| number == next) {
-        let rows = first..first + of_tick.len();
-        first = rows.end;
-        let nearest = rows.clone().min_by(|a, b| late_s[*a].abs().total_cmp(&late_s[*b].abs()));
-        for row in rows.clone().filter(|row| Some(*row) != nearest) {
-            late_s[row] = 0.0;
-        }
-        if rows.len() > 1 && !period.is_certain() {
-            says[rows].fill(false);
+    let mut says = vec![true; stamps_s.len()];
+    if !period.is_certain() {
+        let mut first = 0;
+        for of_tick in period.numbers.chunk_by(|number, next| number == next) {
+            let rows = first..first + of_tick.len();
+            first = rows.end;
+            if rows.len() > 1 {
+                says[rows].fill(false);
+            }
         }
     }
     // The ends of a run stay: what was measured there is compared with them.
@@ -173,7 +170,7 @@ fn read_times(stamps_s: &[f64], share: f64, sigma: f64) -> Option<(Vec<f64>, Vec
         before_s = f64::max(before_s + least_s, stamp_s - share * late_s);
         before_s
     };
-    Some((stamps_s.iter().zip(&late_s).map(read).collect(), says))
+    Some((stamps_s.iter().zip(&period.late_s).map(read).collect(), says))
 }
 
 /// Rows to either side whose counts say how fast a wheel turns, at the least; further ones where stamps are

@@ -141,6 +141,15 @@ pub(crate) const MIN_QUANTUM_RAD: f64 = 3e-5;
 /// Budgeted: a rate over three rows is then off by 2 %.
 pub(crate) const MAX_EXACT_JITTER: f64 = 0.05;
 
+/// Seconds that stamps jitter by where a file rounds them, at the most.
+/// Budgeted: milliseconds are off by 0.29 ms.
+pub(crate) const MAX_ROUNDING_S: f64 = 5e-4;
+
+/// Share of a row that stamps jitter by at the least for a log to have a beat that they are late against: rows of a
+/// slow log jitter by much less than 5 %, and displace the robot by more than an instrument errs.
+/// Convention: that of the sampling period.
+pub(crate) const MIN_BEAT_JITTER: f64 = 0.02;
+
 /// Steps that must be there before angles are taken for counts.
 /// Budgeted: chance does not put 98 of 100 on a grid.
 pub(crate) const MIN_GRID_STEPS: usize = 100;
