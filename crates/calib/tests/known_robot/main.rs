@@ -1,6 +1,10 @@
 //! Methods on logs of a robot whose wheels and wheelbase are known.
 
+mod along;
 mod exact;
 mod golden;
+#[path = "../../../../tests/support/golden_numbers.rs"]
+mod golden_numbers;
 mod log;
+mod report;
 mod scatter;

@@ -12,13 +12,16 @@ use crate::{Column, Model, ModelFit, Noise, Pass, Records, Selection, Thinning};
 
 mod correlated;
 mod covariance_scale;
+mod golden;
 mod map;
+mod one_step;
 mod partial;
 mod partial_poses;
 mod path_shape;
 mod rounding;
 mod selection;
 mod timing;
+mod wall_start;
 mod walls;
 
 const LEFT_RAD: [f64; 12] = [2.0, 2.0, -1.0, 0.0, 3.0, 1.5, 2.0, -2.0, -3.0, 1.0, 2.0, 2.5];

@@ -44,7 +44,7 @@ const DISPLACEMENTS: [u32; 8] = [40; 8];
 
 /// Runs measured by displacements of a second, with errors of which a share `autocorrelation` lasts from one
 /// to the next (a first-order autoregression of variance one, in millimetres and milliradians).
-fn displacement_dataset(runs: &[u32], autocorrelation: f64, seed: u64) -> Dataset {
+pub(super) fn displacement_dataset(runs: &[u32], autocorrelation: f64, seed: u64) -> Dataset {
     let mut normals = Normals(seed);
     let mut dataset = dataset(true);
     let base = dataset.runs[0].clone();
