@@ -3,7 +3,7 @@
 mod along;
 mod exact;
 mod golden;
-#[path = "../../../../tests/support/golden_numbers.rs"]
+#[path = "../../../estimation/src/tests/golden_numbers.rs"]
 mod golden_numbers;
 mod log;
 mod report;

@@ -1,4 +1,5 @@
-//! Every number of a pass, and what fits end at, against those that were found before: `pass.txt` and `fits.txt` of `tests/golden/`.
+//! Every number of a pass, and what fits end at, against those that were found before: `pass.txt` and
+//! `fits.txt` of `tests/golden/`.
 //!
 //! A change that moves a number shows here, whatever it moves. The tests beside this one say that numbers are
 //! right: gradients against differences, a known robot given back.
@@ -10,12 +11,9 @@ use dataset::LidarExtrinsics;
 use super::*;
 use crate::{FitSettings, LogDeadReckoning, NoiseComponent, NormalEquations, PathShape, Solution};
 
-#[path = "../../../../tests/support/golden_numbers.rs"]
-mod golden_numbers;
-
 /// Rows at 50 Hz whose stamps jitter, of ticks of 3 mrad and with a gap, beside poses at 7 Hz with a gap of
 /// their own, by an instrument beside the drive's centre that is late.
-fn dense() -> Dataset {
+pub(super) fn dense() -> Dataset {
     let mut dataset = dataset_of(2, true);
     let rad_per_tick = 3e-3;
     dataset.robot.ticks_per_rev = Some(std::f64::consts::TAU / rad_per_tick);
@@ -74,6 +72,7 @@ fn sets() -> Vec<(&'static str, Dataset)> {
         ("displacements", selection::displacement_dataset(&[12, 9, 7], 0.6, 5)),
         ("late instants", timing::driven(3, 5e-3)),
         ("partial", partial::dataset(partial::GYRO, partial::all)),
+        ("counts beside tapes", partial::in_counts(partial::dataset(partial::NO_GYRO, partial::all), 0.02)),
         ("beside poses", partial_poses::beside_poses(true, 1.0)),
         ("lidar", beside_walls(Some(LidarExtrinsics { yaw_rad: Some(2.7) }))),
         ("lidar of unknown yaw", beside_walls(Some(LidarExtrinsics::default()))),

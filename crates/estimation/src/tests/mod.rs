@@ -13,12 +13,16 @@ use crate::{Column, Model, ModelFit, Noise, Pass, Records, Selection, Thinning};
 mod correlated;
 mod covariance_scale;
 mod golden;
+mod golden_numbers;
+mod groups;
+mod intervals;
 mod map;
 mod one_step;
 mod partial;
 mod partial_poses;
 mod path_shape;
 mod rounding;
+mod scores;
 mod selection;
 mod timing;
 mod wall_start;
@@ -340,6 +344,16 @@ fn a_free_heading_is_at_its_best() {
     // To second order the elimination undoes the move.
     assert!((cost(&off) - cost(&at_best)).abs() < 0.05 * cost(&at_best).abs(), "{} {}", cost(&off), cost(&at_best));
     assert!(off.headings[0].rest < -0.009);
+}
+
+#[test]
+fn a_start_heading_is_that_of_the_path() {
+    let dataset = dataset(false);
+    let records = Records::of(&[dataset.session()]);
+    let found: Vec<f64> =
+        records.segments.iter().map(|segment| crate::optimizer::start_heading(segment, &CENTRED_MODEL, 0)).collect();
+    // Runs start at 0.5 and 1.5 rad; 3 mm over some decimetres.
+    assert!((found[0] - 0.5).abs() < 0.03 && (found[1] - 1.5).abs() < 0.03, "{found:?}");
 }
 
 const CENTRED_MODEL: Model = Model {

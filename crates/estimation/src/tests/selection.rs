@@ -240,6 +240,7 @@ fn decimated_rows_of_one_speed_give_what_single_rows_give() {
     let longest = Decimated::of(&fit.records, &fit.selections, 3.0).expect("fewer").records;
     assert_eq!(longest.segments.iter().map(|segment| segment.intervals.len()).collect::<Vec<_>>(), [9; 2]);
     assert!(fit.decimated(&mut [], 0.15).is_none(), "nothing to put together");
+    assert!(fit.decimated(&mut [], 0.2).is_some(), "no more than half are left");
     // A fit with what goes by single rows is another one by longer ones.
     let mut by_rows: Vec<Box<dyn ModelTerm>> = vec![Box::new(RowTerm)];
     fit.solution.model.term_values = vec![0.01];
