@@ -3,7 +3,9 @@
 use std::f64::consts::FRAC_PI_2;
 
 use calib::methods::augmented_kalman::AugmentedKalman;
-use calib::{AugmentedCalibration, EvaluationOptions, NamedCalibration, RunPath, evaluate_runs_and_paths};
+use calib::{
+    AugmentedCalibration, EvaluationOptions, NamedCalibration, RunPath, corrected_run, evaluate_runs_and_paths,
+};
 use dataset::Dataset;
 use kinematics::Pose;
 use model_term::{Interval, Measurement, ModelTerm, TermParameter};
@@ -117,6 +119,39 @@ fn what_a_term_adds_to_measurements_is_taken_out_of_them_as_a_latency_is() {
     // Some centimetres; at corners a rate is that of both sides, which leaves a part of them.
     assert!(by_none_m > 0.02, "{by_none_m}");
     assert!(by_latency_m < 0.2 * by_none_m && by_term_m < 0.2 * by_none_m, "{by_latency_m} {by_term_m} {by_none_m}");
+}
+
+/// The way up a slope is shorter: what is driven depends on the heading in the room.
+#[derive(Clone)]
+struct Uphill;
+
+impl ModelTerm for Uphill {
+    fn parameters(&self) -> &[TermParameter] {
+        const SLOPE: TermParameter = TermParameter { name: "slope", unit: "1", prior_sigma: 1.0 };
+        &[SLOPE]
+    }
+
+    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        let share = -interval.world_from_body.theta_rad.cos();
+        gradient[0] = interval.change(interval.travel_m.map(|travel_m| share * travel_m));
+    }
+}
+
+#[test]
+fn a_path_depends_on_where_it_starts_if_a_term_does_and_nothing_says_where() {
+    let mut dataset = log();
+    dataset.runs[9].truth.clear();
+    let session = dataset.session();
+    let depends = |run: usize, term: Box<dyn ModelTerm>, value: f64| {
+        let term_values = vec![value; term.parameters().len()];
+        let calibration = AugmentedCalibration { calibration: robot(0.0), terms: vec![term], term_values };
+        let corrected = corrected_run(&session, &session.runs[run], &calibration, &mut 0.0).expect("a log");
+        assert_eq!(corrected.starts_at_identity_why.is_some(), run == 9);
+        corrected.depends_on_start
+    };
+    assert!(depends(9, Box::new(Uphill), 0.05));
+    assert!(!depends(9, Box::new(Uphill), 0.0) && !depends(9, Box::new(Farther), 0.05));
+    assert!(!depends(8, Box::new(Uphill), 0.05), "the first measured pose says where it starts");
 }
 
 #[test]

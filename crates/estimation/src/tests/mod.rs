@@ -347,6 +347,20 @@ fn a_free_heading_is_at_its_best() {
 }
 
 #[test]
+fn innovations_that_were_left_out_are_found_again() {
+    let dataset = dataset(true);
+    let fit = crate::FitSettings::GEOMETRY_ONLY.fit(&[dataset.session()]).expect("a fit");
+    assert!(!fit.solution.pass.innovations.is_empty());
+    assert!(matches!(fit.with_innovations(&mut []), std::borrow::Cow::Borrowed(_)));
+    let without = fit.clone().without_innovations();
+    assert!(without.solution.pass.innovations.is_empty());
+    let again = without.with_innovations(&mut []);
+    let pairs = again.solution.pass.innovations[0].iter().zip(&fit.solution.pass.innovations[0]);
+    // The fit's last pass may go by cached propagations.
+    assert!(pairs.clone().count() > 10 && pairs.clone().all(|(a, b)| (a.z - b.z).abs() < 1e-4));
+}
+
+#[test]
 fn a_start_heading_is_that_of_the_path() {
     let dataset = dataset(false);
     let records = Records::of(&[dataset.session()]);
