@@ -6,5 +6,6 @@ mod golden;
 #[path = "../../../estimation/src/tests/golden_numbers.rs"]
 mod golden_numbers;
 mod log;
+mod partial;
 mod report;
 mod scatter;
