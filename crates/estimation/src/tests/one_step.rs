@@ -26,3 +26,18 @@ fn after_a_step_parts_cost_what_their_parabolas_say() {
     let scale = left.matrix.diagonal().map(f64::sqrt);
     assert!(left.gradient.component_div(&scale).amax() < 1e-9, "{:?}", left.gradient);
 }
+
+#[test]
+fn a_step_is_enough_from_near_and_not_from_far() {
+    let dataset = dataset_of(3, true);
+    let is_near = |factor: f64| {
+        let model = Model { m_per_rad: CENTRED_MODEL.m_per_rad.map(|of| factor * of), ..CENTRED_MODEL };
+        let model = Model { body_from_sensor: BODY_FROM_SENSOR, ..model };
+        let mut fit = ModelFit::from_parameters(model, NOISE, &[dataset.session()]);
+        fit.ungated = true;
+        let parts = fit.scan(&mut []).runs;
+        fit.step_over(parts).expect("determined")
+    };
+    // The square of 5 % is more than a standard deviation of 0.1 %; that of 0.02 % is nothing beside it.
+    assert!(is_near(1.0002) && !is_near(1.05));
+}
