@@ -76,7 +76,7 @@ fuzz:
 kills:
     .ci/run kills
 
-# Does a test fail when an expression is changed? 90 random mutants of a crate: .ci/run mutants CRATE [SEED]; needs cargo-mutants
+# Does a test fail when an expression is changed? 100 random mutants of a crate: .ci/run mutants CRATE [SEED]; needs cargo-mutants
 mutants:
     .ci/run mutants
 

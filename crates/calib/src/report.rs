@@ -139,15 +139,21 @@ pub struct ReportedValue {
 #[serde(untagged)]
 enum ValueOrNumber {
     Number(f64),
-    Value { value: f64, sigma: Option<f64>, ratio_to_nominal: Option<f64> },
+    Value {
+        value: f64,
+        ratio_to_nominal: Option<f64>,
+        sigma: Option<f64>,
+        sigma_why_null: Option<String>,
+        interval_95: Option<[f64; 2]>,
+    },
 }
 
 impl From<ValueOrNumber> for ReportedValue {
     fn from(from: ValueOrNumber) -> Self {
         match from {
             ValueOrNumber::Number(value) => Self::of(value, None),
-            ValueOrNumber::Value { value, sigma, ratio_to_nominal } => {
-                Self { ratio_to_nominal, ..Self::of(value, sigma) }
+            ValueOrNumber::Value { value, ratio_to_nominal, sigma, sigma_why_null, interval_95 } => {
+                Self { value: Some(value), ratio_to_nominal, sigma, sigma_why_null, interval_95 }
             }
         }
     }
@@ -269,19 +275,18 @@ impl CalibrationReport {
             let place = line.map_or_else(|| place.clone(), |line| format!("{place}:{line}"));
             ReportError::NotACalibration { place, message: error.message().trim().replace('\n', "; ") }
         })?;
-        let known: Vec<&str> = KNOWN_KEYS.to_vec();
         for method in &report.methods {
             if let Some((key, value)) = method.parameters.iter().find(|(key, value)| {
                 let length =
                     !Parameter::EXTRINSICS.iter().chain([&Parameter::Latency]).any(|of| of.key() == key.as_str());
                 let value = value.value.unwrap_or(f64::NAN);
-                !known.contains(&key.as_str()) || !value.is_finite() || (length && value <= 0.0)
+                !KNOWN_KEYS.contains(&key.as_str()) || !value.is_finite() || (length && value <= 0.0)
             }) {
                 let message = format!(
                     "[methods.parameters] of {}: {key} = {} is no known value; lengths are positive; known: {}",
                     method.method,
                     value.value.unwrap_or(f64::NAN),
-                    known.join(", ")
+                    KNOWN_KEYS.join(", ")
                 );
                 return Err(ReportError::NotACalibration { place, message });
             }
@@ -446,13 +451,6 @@ mod tests {
     fn a_calibration_file_reads_back_as_it_was_written() {
         let text = report().to_toml().expect("serialises");
         assert_eq!(toml::from_str::<CalibrationReport>(&text).expect("parses"), report());
-    }
-
-    #[test]
-    fn bare_numbers_are_values() {
-        let text = "[[methods]]\nmethod = \"published\"\n[methods.parameters]\nwheel_separation_m = 0.2\n";
-        let report: CalibrationReport = toml::from_str(text).expect("parses");
-        assert_eq!(report.calibrations()[0].values["wheel_separation_m"], 0.2);
     }
 
     #[test]

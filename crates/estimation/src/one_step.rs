@@ -258,7 +258,7 @@ impl ModelFit<'_> {
 
     /// Takes the scoring step of the parts' sum. Returns whether it was small enough for one step to be
     /// efficient.
-    fn step_over(&mut self, mut parts: Vec<NormalEquations>) -> Result<bool, EstimationError> {
+    pub(crate) fn step_over(&mut self, mut parts: Vec<NormalEquations>) -> Result<bool, EstimationError> {
         let own = self.solution.model.own.clone();
         let responses = own.map_or_else(Vec::new, |own| own.eliminate(&mut parts, &self.solution.model));
         let Some(sum) = total(&parts) else { return Err(EstimationError::NoMeasurements) };

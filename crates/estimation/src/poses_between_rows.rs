@@ -128,6 +128,16 @@ mod tests {
     }
 
     #[test]
+    fn a_pose_shares_the_rounding_of_the_row_that_is_nearest() {
+        let mut dataset = dataset(2.0, [314.16, 3e-4, 0.0]);
+        // Poses at 1/8 and 5/8 of each row: that at 5/8 is of the next row, and farther from it.
+        dataset.runs[0].odometry.t_s.iter_mut().for_each(|t_s| *t_s += 0.025);
+        let taken = taken_s(&dataset);
+        let driving: Vec<f64> = taken.iter().copied().filter(|t_s| *t_s < 1.9).collect();
+        assert!(driving[2..].iter().all(|t_s| ((t_s - 0.025) / 0.1).fract() < 0.2), "{driving:?}");
+    }
+
+    #[test]
     fn poses_that_share_little_are_all_taken() {
         // Beside an instrument of 3 mm; of ticks of 0.03 mm; and beside stamps that are off by 20 ms, which
         // at 0.2 m/s are 4 mm.

@@ -395,9 +395,13 @@ mod tests {
         let angle = |t_s: f64| 3.0 * t_s - 1.5 * (1.1 * t_s).cos();
         let by_stamps = Wheels::both(t_s.iter().map(|t_s| angle(*t_s)).collect::<Vec<f64>>());
         let by_period = Wheels::both((0..400).map(|row| angle(0.01 * f64::from(row))).collect::<Vec<f64>>());
+        let half = |row: u32| angle(0.01 * f64::from(row) + 0.5 * jitter(row));
+        let by_half = Wheels::both((0..400).map(half).collect::<Vec<f64>>());
         // The rate by stamps is off by the jitter of both ends, 0.12 of it: 1 and 0 to the square of that.
-        let [of_stamps, of_period] = [&by_stamps, &by_period].map(|turns| share_of_true_stamps(&t_s, turns));
+        let [of_stamps, of_half, of_period] =
+            [&by_stamps, &by_half, &by_period].map(|turns| share_of_true_stamps(&t_s, turns));
         assert!(of_stamps > 0.97 && of_period < 0.03, "{of_stamps} {of_period}");
+        assert!((of_half - 0.5).abs() < 0.03, "{of_half}");
     }
 
     #[test]

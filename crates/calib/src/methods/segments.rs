@@ -347,6 +347,7 @@ mod tests {
         let plain = shares.iter().map(|share| share.gradient * share.gradient.transpose()).sum::<Matrix3<f64>>();
         assert!((inverse * plain * inverse - refitted).norm() / refitted.norm() > 0.1);
         assert!(covariance(&shares[..1], &shares[0].normal).is_none(), "one run shows no scatter");
+        assert!(covariance(&shares[..2], &(shares[0].normal + shares[1].normal)).is_some(), "two runs show one");
     }
 
     #[test]

@@ -58,6 +58,18 @@ fn joint_names_the_run_that_it_could_not_use() {
 }
 
 #[test]
+fn methods_of_whole_paths_name_the_run_that_they_could_not_use() {
+    let mut dataset = Log::exact().dataset();
+    // Its instrument began when its log had ended.
+    dataset.runs[9].truth.iter_mut().for_each(|sample| sample.t_s += 100.0);
+    for name in ["joint", "segments", "augmented_kalman"] {
+        let found = calib::method(name).expect("known").calibrate(&[dataset.session()]).expect("a calibration");
+        let rejected: Vec<&str> = found.runs_rejected.iter().map(|rejected| rejected.run.as_str()).collect();
+        assert_eq!((found.runs_used, &rejected[..]), (dataset.runs.len() - 1, &["9"][..]), "{name}");
+    }
+}
+
+#[test]
 fn every_method_says_what_it_is_and_what_to_drive_for_it() {
     for method in METHODS {
         let (name, about) = (method.name(), method.about());

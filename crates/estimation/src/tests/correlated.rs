@@ -9,7 +9,7 @@ const SIGMA: [f64; 2] = [3e-3, 5e-3];
 
 /// The dataset whose rows state covariances of the noise's size: R Rᵀ about `correlation` of all coordinates,
 /// in other directions from row to row.
-fn stated(with_headings: bool, correlation: f64) -> Dataset {
+pub(super) fn stated(with_headings: bool, correlation: f64) -> Dataset {
     let mut dataset = dataset(with_headings);
     dataset.truth_noise =
         TruthNoise { sigma_xy_m: Some(SIGMA[0]), sigma_theta_rad: Some(SIGMA[1]), ..TruthNoise::default() };

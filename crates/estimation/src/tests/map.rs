@@ -1,8 +1,10 @@
 //! A stated distortion of the map in which the poses are.
 
 use dataset::{MapDistortion, TruthSample, WheelLog};
+use nalgebra::{DMatrix, DVector};
 
-use crate::FitSettings;
+use crate::map_distortion::{OwnScatter, added_covariance};
+use crate::{FitSettings, Information};
 
 /// Poses of SLAM of a robot that stands: no direction of its geometry is determined.
 #[test]
@@ -25,4 +27,33 @@ fn regress_a_fit_that_determines_nothing_has_no_map_to_add() {
     // An empty matrix has no eigenvalues to take, and the library that was asked for them panicked.
     let covariance = fit.covariance(&mut []).expect("nothing is uncertain");
     assert!(covariance.iter().all(|element| *element == 0.0), "{covariance}");
+}
+
+/// The estimate of one place in a map: the gradient of its coordinates is what was measured there, so that it
+/// moves by I⁻¹ times the map's shift, whose coordinates are independent.
+#[test]
+fn a_map_moves_an_estimate_of_one_place_by_what_it_is_distorted_by_there() {
+    let dataset = super::dataset(true);
+    let records = crate::Records::of(&[dataset.session()]);
+    // Of standard deviations that differ by two orders of magnitude.
+    let inverse = DMatrix::from_row_slice(3, 3, &[4e-4, 1e-6, 2e-4, 1e-6, 9e-8, 0.0, 2e-4, 0.0, 1e-3]);
+    let [sigma_xy_m, sigma_theta_rad] = [0.02, 0.01];
+    let distortion = MapDistortion { sigma_xy_m, sigma_theta_rad, length_m: 0.7 };
+    let of_place = |records: &crate::Records<'_>| {
+        let place = &records.segments[0].measurements[2];
+        let gradient = DVector::from_row_slice(&[place.x_m, place.y_m, place.theta_rad.expect("measured")]);
+        vec![Information { matrix: DMatrix::zeros(3, 3), gradient }]
+    };
+    let added = added_covariance(&records, distortion, OwnScatter::NotCounted, &inverse, of_place);
+    let shift = DMatrix::from_diagonal(&DVector::from_row_slice(&[
+        sigma_xy_m * sigma_xy_m,
+        sigma_xy_m * sigma_xy_m,
+        sigma_theta_rad * sigma_theta_rad,
+    ]));
+    let expected = &inverse * shift * &inverse;
+    let size = expected.diagonal().map(f64::sqrt);
+    for (row, column) in (0..9).map(|k| (k / 3, k % 3)) {
+        let off = (added[(row, column)] - expected[(row, column)]) / (size[row] * size[column]);
+        assert!(off.abs() < 1e-9, "{row} {column}: {added} {expected}");
+    }
 }

@@ -12,13 +12,20 @@ use crate::{Column, Model, ModelFit, Noise, Pass, Records, Selection, Thinning};
 
 mod correlated;
 mod covariance_scale;
+mod golden;
+mod golden_numbers;
+mod groups;
+mod intervals;
 mod map;
+mod one_step;
 mod partial;
 mod partial_poses;
 mod path_shape;
 mod rounding;
+mod scores;
 mod selection;
 mod timing;
+mod wall_start;
 mod walls;
 
 const LEFT_RAD: [f64; 12] = [2.0, 2.0, -1.0, 0.0, 3.0, 1.5, 2.0, -2.0, -3.0, 1.0, 2.0, 2.5];
@@ -337,6 +344,30 @@ fn a_free_heading_is_at_its_best() {
     // To second order the elimination undoes the move.
     assert!((cost(&off) - cost(&at_best)).abs() < 0.05 * cost(&at_best).abs(), "{} {}", cost(&off), cost(&at_best));
     assert!(off.headings[0].rest < -0.009);
+}
+
+#[test]
+fn innovations_that_were_left_out_are_found_again() {
+    let dataset = dataset(true);
+    let fit = crate::FitSettings::GEOMETRY_ONLY.fit(&[dataset.session()]).expect("a fit");
+    assert!(!fit.solution.pass.innovations.is_empty());
+    assert!(matches!(fit.with_innovations(&mut []), std::borrow::Cow::Borrowed(_)));
+    let without = fit.clone().without_innovations();
+    assert!(without.solution.pass.innovations.is_empty());
+    let again = without.with_innovations(&mut []);
+    let pairs = again.solution.pass.innovations[0].iter().zip(&fit.solution.pass.innovations[0]);
+    // The fit's last pass may go by cached propagations.
+    assert!(pairs.clone().count() > 10 && pairs.clone().all(|(a, b)| (a.z - b.z).abs() < 1e-4));
+}
+
+#[test]
+fn a_start_heading_is_that_of_the_path() {
+    let dataset = dataset(false);
+    let records = Records::of(&[dataset.session()]);
+    let found: Vec<f64> =
+        records.segments.iter().map(|segment| crate::optimizer::start_heading(segment, &CENTRED_MODEL, 0)).collect();
+    // Runs start at 0.5 and 1.5 rad; 3 mm over some decimetres.
+    assert!((found[0] - 0.5).abs() < 0.03 && (found[1] - 1.5).abs() < 0.03, "{found:?}");
 }
 
 const CENTRED_MODEL: Model = Model {

@@ -422,3 +422,34 @@ fn records_window_s(records: &Records<'_>) -> f64 {
         _ => f64::NAN,
     }
 }
+
+/// The run in counts of `rad`.
+pub(super) fn in_counts(mut dataset: Dataset, rad: f64) -> Dataset {
+    dataset.robot.ticks_per_rev = Some(std::f64::consts::TAU / rad);
+    for run in &mut dataset.runs {
+        let WheelLog::Angles(angles) = &run.odometry.wheels else { unreachable!("the helper logs angles") };
+        let ticks = |column: &Vec<f64>| column.iter().map(|turned| (turned / rad).round() as i64).collect();
+        run.odometry.wheels = WheelLog::Ticks(angles.as_ref().map(ticks));
+    }
+    dataset
+}
+
+#[test]
+fn a_tape_has_the_rounding_of_the_counts_at_both_of_its_ends() {
+    // Counts of 1.6 mm under a tape of a tenth of a millimetre, and wheels that do not scatter.
+    let (rad, sigma_m) = (0.02, 1e-4);
+    let taped = dataset(NO_GYRO, |run, poses| {
+        tape(run, poses, [20, 120], 0.0);
+        run.distances[0].sigma_m = sigma_m;
+    });
+    let exact_wheels = Noise { variance: [1e-16, 1e-16, 1.0, 1.0], timing_s2: 0.0 };
+    let mut model = nominal();
+    (model.m_per_rad, model.separation_m) = (M_PER_RAD, SEPARATION_M);
+    let found = equations(&in_counts(taped, rad), &model, &exact_wheels);
+    assert_eq!(found.count, 4.0);
+    // A wheel's count is off by up to half of itself, uniformly; the centre goes by the mean of the wheels.
+    let of_an_end_m2 = rad * rad / 12.0 * (M_PER_RAD.left.powi(2) + M_PER_RAD.right.powi(2)) / 4.0;
+    let expected = (sigma_m * sigma_m + 2.0 * of_an_end_m2).ln();
+    // The path is straight, so that what wheels err against each other goes across the tape.
+    assert!((found.log_det / 4.0 - expected).abs() < 1e-3, "{} {expected}", found.log_det / 4.0);
+}

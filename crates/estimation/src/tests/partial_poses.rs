@@ -47,7 +47,7 @@ fn passed(dataset: &Dataset, model: &Model, noise: &Noise) -> Pass {
 }
 
 /// A log of poses with everything else, whose standard deviations are a factor of what they are.
-fn beside_poses(has_headings: bool, factor: f64) -> Dataset {
+pub(super) fn beside_poses(has_headings: bool, factor: f64) -> Dataset {
     let mut gyro = GYRO;
     gyro.noise_rad_per_sqrt_s = gyro.noise_rad_per_sqrt_s.map(|noise| factor * noise);
     dataset(gyro, |run, poses| {

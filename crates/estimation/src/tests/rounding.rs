@@ -6,7 +6,7 @@ use super::*;
 
 /// The runs of [`dataset`] as counts of 0.01 rad, measured at every row, and three times more while the robot
 /// stands between the rows of seconds 3 and 4.
-fn counted() -> Dataset {
+pub(super) fn counted() -> Dataset {
     let mut dataset = dataset(true);
     dataset.robot.ticks_per_rev = Some(std::f64::consts::TAU / 0.01);
     for run in &mut dataset.runs {

@@ -44,7 +44,7 @@ const DISPLACEMENTS: [u32; 8] = [40; 8];
 
 /// Runs measured by displacements of a second, with errors of which a share `autocorrelation` lasts from one
 /// to the next (a first-order autoregression of variance one, in millimetres and milliradians).
-fn displacement_dataset(runs: &[u32], autocorrelation: f64, seed: u64) -> Dataset {
+pub(super) fn displacement_dataset(runs: &[u32], autocorrelation: f64, seed: u64) -> Dataset {
     let mut normals = Normals(seed);
     let mut dataset = dataset(true);
     let base = dataset.runs[0].clone();
@@ -240,6 +240,7 @@ fn decimated_rows_of_one_speed_give_what_single_rows_give() {
     let longest = Decimated::of(&fit.records, &fit.selections, 3.0).expect("fewer").records;
     assert_eq!(longest.segments.iter().map(|segment| segment.intervals.len()).collect::<Vec<_>>(), [9; 2]);
     assert!(fit.decimated(&mut [], 0.15).is_none(), "nothing to put together");
+    assert!(fit.decimated(&mut [], 0.2).is_some(), "no more than half are left");
     // A fit with what goes by single rows is another one by longer ones.
     let mut by_rows: Vec<Box<dyn ModelTerm>> = vec![Box::new(RowTerm)];
     fit.solution.model.term_values = vec![0.01];

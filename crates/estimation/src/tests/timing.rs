@@ -13,7 +13,7 @@ const JITTER_S: f64 = 5e-3;
 
 /// Eight runs of 20 s that stand, drive and turn, measured at every row to a millimetre and a milliradian, at
 /// instants that are off by normal errors of this size.
-fn driven(seed: u64, jitter_s: f64) -> Dataset {
+pub(super) fn driven(seed: u64, jitter_s: f64) -> Dataset {
     let mut dataset = dataset_of(1, true);
     let mut stream = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut draw = move |sigma: f64| {

@@ -20,7 +20,7 @@ fn seen_by_lidar(run: &mut Run, poses: &[Pose]) {
     }
 }
 
-fn log(lidar: Option<LidarExtrinsics>) -> Dataset {
+pub(super) fn log(lidar: Option<LidarExtrinsics>) -> Dataset {
     let mut dataset = dataset(NO_GYRO, |run, poses| {
         seen_by_lidar(run, poses);
         tape(run, poses, [20, 120], 0.0);

@@ -1,0 +1,36 @@
+//! Scores of runs with the free columns taken out: their sum, and their variances.
+
+use super::*;
+use crate::{NormalEquations, SchurComplement};
+
+/// Roundings, and the ridge of 10⁻¹², which changes what the free columns explain by as much of itself.
+const TOLERANCE: f64 = 1e-9;
+
+#[test]
+fn scores_of_runs_and_their_variances_sum_to_those_of_all_runs() {
+    let dataset = dataset_of(4, true);
+    let fit = ModelFit::from_parameters(MODEL, NOISE, &[dataset.session()]);
+    let runs = fit.scan(&mut [Box::new(TravelTerm)]).runs;
+    let all = total(&runs).expect("runs");
+    let tested = [Column::Term(0).index(), Column::Term(1).index()];
+    let free = [Column::LeftWheel, Column::RightWheel, Column::Separation, Column::SensorY];
+    // One direction of the free columns stays nominal.
+    let fixed = nalgebra::DVector::from_row_slice(&[0.6, -0.8, 0.0, 0.0]);
+    for basis in [crate::free_basis(4, &[]), crate::free_basis(4, &[fixed])] {
+        let complement = SchurComplement::of(&all, &free, basis).expect("determined");
+        let projected = complement.of_columns(&all, &tested);
+        let scores = runs.iter().map(|run| complement.score_of(run, &all, &tested));
+        let sum = scores.fold(nalgebra::DVector::zeros(2), |sum, score| sum + score);
+        let scale = projected.information.diagonal().map(f64::sqrt);
+        assert!((sum - &projected.gradient).component_div(&scale).amax() < TOLERANCE);
+        let of = |run: &NormalEquations| complement.variance_of(run, &all, &tested);
+        let sum = runs.iter().map(of).fold(nalgebra::DMatrix::zeros(2, 2), |sum, variance| sum + variance);
+        // Of all runs together it is the information that is left.
+        for (name, variance) in [("sum", sum), ("of all", of(&all))] {
+            let off = (&variance - &projected.information).amax() / projected.information.amax();
+            assert!(off < TOLERANCE, "{name}: {variance} {}", projected.information);
+        }
+        // The free columns do explain a part.
+        assert!(projected.share.iter().all(|share| *share < 0.99), "{:?}", projected.share);
+    }
+}
