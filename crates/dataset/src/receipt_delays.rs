@@ -20,8 +20,8 @@ const LOST: [f64; 17] =
 const LOST_STEPS: [f64; 2] = [1.25e-3, 3e-4];
 /// Log odds against rows that are lost or came between ticks at all.
 const LOST_COST: f64 = 8.0;
-/// Mean of the share of rows that are lost, which falls off exponentially: where delays are beats long, rows tell
-/// hardly more than that some are.
+/// Mean of the share of rows that are lost, which falls off exponentially: where delays are beats long, rows
+/// tell hardly more than that some are.
 const USUAL_LOST: f64 = 0.01;
 /// Probability of a step of one beat at a row, in either direction, where none is expected.
 const MIN_STEPS: f64 = 3e-4;
@@ -292,8 +292,8 @@ impl Received {
     }
 }
 
-/// Whether rows come in bunches, so that their stamps are those of receipt and single gaps say nothing of rows that
-/// are missing.
+/// Whether rows come in bunches, so that their stamps are those of receipt and single gaps say nothing of
+/// rows that are missing.
 #[must_use]
 pub fn has_bunched_rows(t_s: &[f64]) -> bool {
     t_s.len() > 1 && bunches(t_s).is_some()
@@ -398,7 +398,8 @@ mod tests {
     #[test]
     fn rows_that_are_lost_among_delays_of_many_beats_leave_the_beat() {
         let found = found(&received(6000, 0.023, 5.0, due_s));
-        // Rejects beats compared by densities a beat, of which the longest was the likeliest: none without an end.
+        // Rejects beats compared by densities a beat, of which the longest was the likeliest: none without an
+        // end.
         assert!((found.period_s / PERIOD_S - 1.0).abs() < 0.03, "{}", found.period_s);
         assert!(found.numbers().last().is_some_and(|last| (last - 5999).abs() < 180));
     }

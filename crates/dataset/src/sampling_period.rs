@@ -45,6 +45,9 @@ const BY_ITSELF_COST: f64 = 10.0;
 const HUBER_SIGMAS: f64 = 1.5;
 /// Where stamps are later than that share of the beat, root mean square, some numbers of rows are wrong.
 const MAX_CERTAIN_LATENESS: f64 = 0.25;
+/// Share of the beat that stamps jitter by, up to which a row that came by itself is told from a late one: by
+/// five standard deviations halfway between ticks.
+const MAX_JITTER_BESIDE: f64 = 0.1;
 /// Share of the beat by which stamps are held to jitter at the least: what rounded file formats leave.
 const MIN_JITTER: f64 = 0.02;
 
@@ -61,6 +64,8 @@ pub struct SamplingPeriod {
     /// Whether rows come in bunches: they are stamped on receipt, and one that is late holds up those behind
     /// it.
     pub is_bunched: bool,
+    /// What rows are off their ticks by, root mean square, seconds; those that came by themselves too.
+    off_s: f64,
 }
 
 impl SamplingPeriod {
@@ -71,8 +76,9 @@ impl SamplingPeriod {
             return None;
         }
         if let Some(received) = Received::of(t_s) {
-            let late_s = t_s.iter().zip(&received.read_s).map(|(t_s, read_s)| t_s - read_s).collect();
-            return Some(Self { period_s: received.period_s, numbers: received.numbers(), late_s, is_bunched: true });
+            let late_s: Vec<f64> = t_s.iter().zip(&received.read_s).map(|(t_s, read_s)| t_s - read_s).collect();
+            let (period_s, numbers, off_s) = (received.period_s, received.numbers(), root_mean_square(&late_s));
+            return Some(Self { period_s, numbers, late_s, is_bunched: true, off_s });
         }
         let gap_s = median(t_s.windows(2).map(|pair| pair[1] - pair[0]).collect())?;
         // The middle gap is exact where stamps are.
@@ -84,18 +90,21 @@ impl SamplingPeriod {
                 found.settled(t_s)
             }
         };
-        let mut late_s = lateness(t_s, &numbers, period_s);
+        let late_s = lateness(t_s, &numbers, period_s);
+        let off_s = root_mean_square(&late_s);
+        // Where stamps jitter by more, rows that share a number need not have come by themselves.
+        let mut of_ticks_s = late_s.clone();
         for row in by_themselves(&numbers, &late_s) {
-            late_s[row] = 0.0;
+            of_ticks_s[row] = 0.0;
         }
-        Some(Self { period_s, numbers, late_s, is_bunched: false })
+        let late_s = if root_mean_square(&of_ticks_s) < MAX_JITTER_BESIDE * period_s { of_ticks_s } else { late_s };
+        Some(Self { period_s, numbers, late_s, is_bunched: false, off_s })
     }
 
     /// Whether stamps are near enough to the beat that the numbers of all rows are right.
     #[must_use]
     pub fn is_certain(&self) -> bool {
-        let square_s2 = self.late_s.iter().map(|late_s| late_s * late_s).sum::<f64>() / self.late_s.len() as f64;
-        square_s2.sqrt() <= MAX_CERTAIN_LATENESS * self.period_s
+        self.off_s <= MAX_CERTAIN_LATENESS * self.period_s
     }
 
     /// Ticks from a row to the next one: 2 where one row is missing between them.
@@ -103,6 +112,10 @@ impl SamplingPeriod {
     pub fn ticks_after(&self, row: usize) -> Option<i64> {
         Some(self.numbers.get(row + 1)? - self.numbers[row])
     }
+}
+
+fn root_mean_square(values: &[f64]) -> f64 {
+    (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt()
 }
 
 fn median(mut values: Vec<f64>) -> Option<f64> {

@@ -252,9 +252,9 @@ fn without_errors_of_the_map(results: &StageResults<'_, '_>, mut findings: Vec<F
     findings
 }
 
-/// Stamps that were set right only roughly, or that a term explains which does not know of which tick all rows are,
-/// leave errors that no term is of. Where something that is in no catalogue explains the data as well as what was
-/// found, that is what they left.
+/// Stamps that were set right only roughly, or that a term explains which does not know of which tick all
+/// rows are, leave errors that no term is of. Where something that is in no catalogue explains the data as
+/// well as what was found, that is what they left.
 fn without_remainders_of_stamps(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
     let are_rough = match results.stamps {
         Some(stamps) => stamps.is_undone_roughly,

@@ -220,7 +220,8 @@ pub(crate) const MIN_UNKNOWN_TURN_RAD: f64 = 0.1;
 /// Convention: beyond what normal errors do in any log.
 pub(crate) const MIN_UNKNOWN_SIGMAS: f64 = 10.0;
 
-/// Standard deviations of a longer window that a displacement has to be, for the window to tell whether it lasts.
+/// Standard deviations of a longer window that a displacement has to be, for the window to tell whether it
+/// lasts.
 /// Derived: half of it is asked for, which is then four standard deviations.
 pub(crate) const MIN_SURROUNDING_SIGMAS: f64 = 8.0;
 

@@ -141,8 +141,8 @@ fn restamped(dataset: &Dataset, share: f64, sigma: f64) -> Option<Dataset> {
 }
 
 /// When rows were read that have these stamps, and which rows say when. A row of a tick was read nearer to
-/// the beat by the false share; one that came by itself has no beat to say when but its stamp. Where stamps are later than a tick can be told by,
-/// none of them says when.
+/// the beat by the false share; one that came by itself has no beat to say when but its stamp. Where stamps
+/// are later than a tick can be told by, none of several rows of one tick says when.
 fn read_times(stamps_s: &[f64], share: f64, sigma: f64) -> Option<(Vec<f64>, Vec<bool>)> {
     if share <= 0.0 {
         return None;

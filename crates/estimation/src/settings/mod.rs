@@ -145,8 +145,8 @@ pub(crate) const MAX_EXACT_JITTER: f64 = 0.05;
 /// Budgeted: milliseconds are off by 0.29 ms.
 pub(crate) const MAX_ROUNDING_S: f64 = 5e-4;
 
-/// Share of a row that stamps jitter by at the least for a log to have a beat that they are late against: rows of a
-/// slow log jitter by much less than 5 %, and displace the robot by more than an instrument errs.
+/// Share of a row that stamps jitter by at the least for a log to have a beat that they are late against:
+/// rows of a slow log jitter by much less than 5 %, and displace the robot by more than an instrument errs.
 /// Convention: that of the sampling period.
 pub(crate) const MIN_BEAT_JITTER: f64 = 0.02;
 
