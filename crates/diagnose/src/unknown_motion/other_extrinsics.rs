@@ -2,7 +2,7 @@
 
 use kinematics::{Pose, wrap_to_pi};
 
-use super::{AnomalyKind, Event, Limits};
+use super::events::{AnomalyKind, Event, Limits};
 use crate::pose_windows::CalibratedTracks;
 use crate::settings::records::{
     LASTING_SHARE, MAX_LEAST_EXTRINSICS, MIN_EXTRINSICS, MIN_OTHER_EXTRINSICS_RAD, MIN_OTHER_EXTRINSICS_SIGMAS,
