@@ -234,6 +234,13 @@ fn regress_a_figure_of_the_smallest_doubles_has_ticks() {
     mended("sweep-state", &[200_002_179]);
 }
 
+/// Information beyond doubles gave odds that were none, and a search without a cause; a term that a fit does
+/// not determine was printed with ± NaN.
+#[test]
+fn regress_information_beyond_doubles_is_no_evidence() {
+    mended("diagnosis", &[300_015_556, 300_026_141, 300_030_664]);
+}
+
 /// Which number is under way, for executions that end the process: memory that runs out, a stack that does.
 fn note(line: &str) {
     if let Ok(file) = std::env::var("YAIR_FUZZ_NOTE") {

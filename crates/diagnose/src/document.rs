@@ -214,6 +214,15 @@ pub struct UnlistedTerm {
     pub sigma: f64,
 }
 
+impl UnlistedTerm {
+    /// A term with its coefficient's value and standard deviation; `None` where the data do not determine it.
+    pub(crate) fn determined(channel: &str, covariates: Vec<String>, size: (f64, f64)) -> Option<Self> {
+        let (coefficient, sigma) = size;
+        let is_determined = coefficient.is_finite() && sigma.is_finite();
+        is_determined.then(|| Self { channel: channel.to_owned(), covariates, coefficient, sigma })
+    }
+}
+
 /// Detection limits by effect.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Blind {

@@ -178,11 +178,10 @@ fn z(test: &Test, p_value: f64) -> f64 {
 /// The finding of a sparse term at the end of a model's candidates.
 pub(crate) fn of_sparse(candidate: &Candidate, test: &Test, p_value: f64, trials: usize) -> Option<Finding> {
     let Candidate::Sparse(sparse) = candidate else { return None };
-    let (coefficient, sigma) = *test.estimates.first()?;
-    let channel = sparse.channel.name().to_owned();
-    let term = UnlistedTerm { channel, covariates: sparse.names(), coefficient, sigma };
+    let (channel, size) = (sparse.channel.name(), *test.estimates.first()?);
+    let cause = UnlistedTerm::determined(channel, sparse.names(), size).map_or(Cause::Unknown, Cause::Term);
     Some(Finding {
-        causes: vec![Cause::Term(term)],
+        causes: vec![cause],
         probability: 1.0,
         z: z(test, p_value),
         p_value,

@@ -150,6 +150,8 @@ fn contenders(entries: &[Entry], best: f64) -> Vec<&Entry> {
 /// how much likelier it makes the data, its estimates along principal directions, and how many variants were
 /// tried.
 fn odds_and_explained(likelier: f64, directions: Option<&[(f64, f64)]>, trials: usize) -> (f64, f64) {
+    // A likelihood that is no number says nothing for the candidate.
+    let likelier = if likelier.is_nan() { f64::NEG_INFINITY } else { likelier };
     let log_odds = directions.map_or(f64::NEG_INFINITY, |directions| likelier + occam_factor(directions));
     let explains = likelier - 0.5 * directions.map_or(0, <[_]>::len) as f64;
     (log_odds - (trials as f64).ln(), explains)

@@ -36,11 +36,7 @@ pub(crate) struct Scored {
 
 /// A candidate's information and gradient in units of what is plausible, along its principal directions:
 /// eigenvalue and gradient of each.
-pub(crate) fn principal(
-    information: &DMatrix<f64>,
-    gradient: &DVector<f64>,
-    parameters: &[TermParameter],
-) -> Vec<(f64, f64)> {
+fn principal(information: &DMatrix<f64>, gradient: &DVector<f64>, parameters: &[TermParameter]) -> Vec<(f64, f64)> {
     let prior_sigma = DVector::from_fn(parameters.len(), |k, _| parameters[k].prior_sigma);
     let scaled = DMatrix::from_fn(parameters.len(), parameters.len(), |i, j| {
         information[(i, j)] * prior_sigma[i] * prior_sigma[j]
@@ -48,6 +44,21 @@ pub(crate) fn principal(
     let scaled_gradient = gradient.component_mul(&prior_sigma);
     let eigen = scaled.symmetric_eigen();
     (0..parameters.len()).map(|k| (eigen.eigenvalues[k], eigen.eigenvectors.column(k).dot(&scaled_gradient))).collect()
+}
+
+/// The directions in which a size shows in the data at all. What is beyond numbers of double precision
+/// shows nothing.
+pub(crate) fn detectable_directions(
+    information: &DMatrix<f64>,
+    gradient: &DVector<f64>,
+    parameters: &[TermParameter],
+) -> Vec<(f64, f64)> {
+    let mut directions = principal(information, gradient, parameters);
+    directions.retain(|(value, gradient)| {
+        let is_number = value.is_finite() && (gradient * gradient).is_finite();
+        is_number && *value >= MIN_DETECTABLE_SIGMAS * MIN_DETECTABLE_SIGMAS
+    });
+    directions
 }
 
 /// Log Occam factor: log evidence with some sizes free over that at the best sizes. It is what their
@@ -76,9 +87,8 @@ pub(crate) fn log_occam_factor(directions: &[(f64, f64)]) -> f64 {
 pub(crate) fn detectable_statistic(own: &[Candidate], projected: &Projected) -> (f64, usize) {
     let Projected { information, gradient, .. } = projected;
     let parameters: Vec<_> = own.iter().flat_map(Candidate::parameters).collect();
-    principal(information, gradient, &parameters)
+    detectable_directions(information, gradient, &parameters)
         .into_iter()
-        .filter(|(value, _)| *value >= MIN_DETECTABLE_SIGMAS * MIN_DETECTABLE_SIGMAS)
         .fold((0.0, 0), |(sum, n), (value, gradient)| (sum + gradient * gradient / value, n + 1))
 }
 
@@ -172,8 +182,7 @@ fn score_test(
     let shrink = freedom / count.max(1.0);
     let mut directions = Vec::new();
     if share.iter().any(|share| *share > MIN_COLUMN_SHARE) {
-        directions = principal(information, gradient, &parameters);
-        directions.retain(|(value, _)| *value >= MIN_DETECTABLE_SIGMAS * MIN_DETECTABLE_SIGMAS);
+        directions = detectable_directions(information, gradient, &parameters);
     }
     let dimensions = directions.len();
     let explained: Vec<(f64, f64)> =

@@ -7,9 +7,8 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::augmented_model::AugmentedModel;
 use crate::null_distribution::NullDistribution;
-use crate::scan::{freedom, principal};
+use crate::scan::{detectable_directions, freedom};
 use crate::settings::levels::{MIN_RUNS, NORMAL_QUANTILE_95};
-use crate::settings::search::MIN_DETECTABLE_SIGMAS;
 use crate::statistics::{p_of_statistic, p_of_student, student_95};
 
 /// A test of one candidate of a fitted model.
@@ -41,9 +40,8 @@ fn wald_test_of(
     (count, freedom): (f64, f64),
 ) -> (Test, Vec<(f64, f64)>) {
     let gradient = information * estimates;
-    let directions: Vec<(f64, f64)> = principal(information, &gradient, parameters)
+    let directions: Vec<(f64, f64)> = detectable_directions(information, &gradient, parameters)
         .into_iter()
-        .filter(|(value, _)| *value >= MIN_DETECTABLE_SIGMAS * MIN_DETECTABLE_SIGMAS)
         .map(|(value, gradient)| (value, gradient / value))
         .collect();
     let shrink = freedom / count.max(1.0);
