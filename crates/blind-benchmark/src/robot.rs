@@ -279,7 +279,8 @@ fn in_runs(programs: &[MotionProgram], runs: u32) -> Vec<MotionProgram> {
             }
             motions.push(stand(STANDING_S));
             match part {
-                [alone] => MotionProgram { motions, ..alone.clone() },
+                // Free runs have numbers, which would be those of others among runs that were joined.
+                [alone] if alone.protocol != Protocol::Free => MotionProgram { motions, ..alone.clone() },
                 _ => MotionProgram {
                     id: format!("run_{run:03}"),
                     protocol: Protocol::Free,
@@ -322,4 +323,30 @@ fn free(run: usize, forward: bool, (speed_m_s, tightest_m): (f64, f64), share: f
         .collect();
     let settings = ProtocolSettings::default();
     MotionProgram { id: format!("run_{run:03}"), protocol: Protocol::Free, settings, motions }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    #[test]
+    fn runs_that_are_joined_and_runs_that_stay_alone_have_names_of_their_own() {
+        let program = |run: usize| MotionProgram {
+            id: format!("run_{run:03}"),
+            protocol: Protocol::Free,
+            settings: ProtocolSettings::default(),
+            motions: Vec::new(),
+        };
+        for programs in 1..12 {
+            let all: Vec<MotionProgram> = (0..programs).map(program).collect();
+            for runs in 1..=programs as u32 {
+                let joined = in_runs(&all, runs);
+                let ids: BTreeSet<&str> = joined.iter().map(|run| run.id.as_str()).collect();
+                // Rejects 7 programs in 5 runs, of which the fifth and the fourth were run_004.
+                assert_eq!(ids.len(), runs as usize, "{programs} programs in {runs} runs: {ids:?}");
+            }
+        }
+    }
 }
