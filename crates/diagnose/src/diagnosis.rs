@@ -28,7 +28,7 @@ use crate::settings::records::{
     MAX_REJECTED_FRACTION, MIN_COMMON_CLOCK_OFFSET_S, MIN_MEASUREMENTS_PER_RUN, MIN_REJECTING_CLOCK_OFFSET_S,
 };
 use crate::stage::{OnStage, Step};
-use crate::stamp_errors::{stamp_error, stamp_error_by_counts, whole_stamp_error, with_rows_of};
+use crate::stamp_errors::{stamp_error, stamp_error_by_counts, uncertain_tick_s, whole_stamp_error, with_rows_of};
 use crate::text;
 use crate::unknown_motion::unknown_motions;
 
@@ -165,7 +165,7 @@ fn stages(
     let datasets = by_counts.as_ref().map_or(datasets, |error| &error.records[..]);
     let clocks = clock_offsets(datasets, min_common_clock_s);
     let datasets = clocks.records.as_deref().unwrap_or(datasets);
-    let odd = unknown_motions(datasets, clocks.remaining_s);
+    let odd = unknown_motions(datasets, clocks.remaining_s, uncertain_tick_s(recorded));
     let (datasets, anomalies) =
         odd.as_ref().map_or((datasets, &[][..]), |found| (&found.records[..], &found.anomalies[..]));
     begins(Step::RecordFaults);

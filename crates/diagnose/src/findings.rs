@@ -256,9 +256,13 @@ fn without_errors_of_the_map(results: &StageResults<'_, '_>, mut findings: Vec<F
 /// rows are, leave errors that no term is of. Where something that is in no catalogue explains the data as
 /// well as what was found, that is what they left.
 fn without_remainders_of_stamps(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    // Of a negative share the stamps are true.
+    let is_of_late_stamps = |finding: &Finding| {
+        finding.is_of_stamps() && finding.parameters.get("share").is_none_or(|share| share.value > 0.0)
+    };
     let are_rough = match results.stamps {
         Some(stamps) => stamps.is_undone_roughly,
-        None => findings.iter().any(Finding::is_of_stamps) && have_uncertain_rows(results.recorded),
+        None => findings.iter().any(is_of_late_stamps) && have_uncertain_rows(results.recorded),
     };
     if are_rough {
         findings.retain(|finding| finding.is_of_stamps() || !finding.has_unlisted());

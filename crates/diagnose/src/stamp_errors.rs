@@ -3,7 +3,7 @@
 //! Speeds, accelerations and the instants of measurements all come from the stamps. Stamps that are wrong by
 //! much are therefore more than one linear term: what that term leaves resembles other effects.
 
-use dataset::{Dataset, Run, SamplingPeriod};
+use dataset::{Dataset, SamplingPeriod};
 use estimation::{FitSettings, ModelFit, Thinning};
 
 use crate::augmented_model::{AugmentedModel, cost, count, refit};
@@ -48,8 +48,15 @@ impl StampError {
 
 /// Whether stamps do not tell in some run of which tick each row is.
 pub(crate) fn have_uncertain_rows(datasets: &[Dataset]) -> bool {
-    let is_uncertain = |run: &Run| SamplingPeriod::of(&run.odometry.t_s).is_some_and(|period| !period.is_certain());
-    datasets.iter().flat_map(|dataset| &dataset.runs).any(is_uncertain)
+    uncertain_tick_s(datasets) > 0.0
+}
+
+/// The longest sampling period of the runs in which stamps do not tell of which tick each row is, seconds; 0
+/// where they do in all.
+pub(crate) fn uncertain_tick_s(datasets: &[Dataset]) -> f64 {
+    let runs = datasets.iter().flat_map(|dataset| &dataset.runs);
+    let periods = runs.filter_map(|run| SamplingPeriod::of(&run.odometry.t_s)).filter(|period| !period.is_certain());
+    periods.map(|period| period.period_s).fold(0.0, f64::max)
 }
 
 /// An error of the stamps that counts show by themselves, whatever the instrument says.

@@ -37,17 +37,15 @@ pub(crate) struct Event {
 pub(crate) struct Limits {
     /// Least that no wheel misses.
     least: Residual,
+    /// Least distance by which an instrument is mounted elsewhere, metres.
+    pub(crate) place_m: f64,
     /// Standard deviations of windows of each span, by the 90 % quantile.
     sigmas: Vec<Residual>,
 }
 
 impl Limits {
-    /// Least distance by which an instrument is mounted elsewhere, metres.
-    pub(crate) const fn place_m(&self) -> f64 {
-        self.least.data.0[0][0] * MIN_OTHER_EXTRINSICS_SEPARATIONS / MIN_UNKNOWN_ALONG_SEPARATIONS
-    }
-
-    pub(crate) fn of(calibrated: &CalibratedTracks<'_>, separation_m: f64) -> Self {
+    /// By the windows of all tracks, and by what the robot moves in the time that stamps may be wrong by.
+    pub(crate) fn of(calibrated: &CalibratedTracks<'_>, separation_m: f64, tick_s: f64) -> Self {
         let of_span = |span: &usize| {
             let mut all: [Vec<f64>; 3] = Default::default();
             for (track, of) in calibrated.tracks.iter().enumerate() {
@@ -69,7 +67,10 @@ impl Limits {
             MIN_UNKNOWN_ACROSS_SEPARATIONS * separation_m,
             MIN_UNKNOWN_TURN_RAD,
         );
-        Self { least, sigmas: WINDOW_SPANS.iter().map(of_span).collect() }
+        let (speed_m_s, rate_rad_s) = brisk_rates(calibrated);
+        let by_a_tick = tick_s * Residual::new(speed_m_s, speed_m_s, rate_rad_s);
+        let place_m = MIN_OTHER_EXTRINSICS_SEPARATIONS * separation_m;
+        Self { least: least + by_a_tick, place_m, sigmas: WINDOW_SPANS.iter().map(of_span).collect() }
     }
 
     /// Standard deviations of a residual that is beyond wheels.
@@ -160,6 +161,24 @@ impl Limits {
         found.sort_by_key(|event| event.poses.start);
         found
     }
+}
+
+/// Speed and turn rate of the robot where it is brisk, by the 90 % quantile, m/s and rad/s.
+fn brisk_rates(calibrated: &CalibratedTracks<'_>) -> (f64, f64) {
+    let (mut speeds, mut rates) = (Vec::new(), Vec::new());
+    for (track, of) in calibrated.tracks.iter().enumerate() {
+        let poses = calibrated.poses(track);
+        for to in 1..of.len() {
+            let (moved, time_s) = (poses[to - 1].to(poses[to]), of.t_s[to] - of.t_s[to - 1]);
+            speeds.push(moved.x_m.hypot(moved.y_m) / time_s);
+            rates.push(wrap_to_pi(moved.theta_rad).abs() / time_s);
+        }
+    }
+    let quantile = |mut all: Vec<f64>| {
+        all.sort_by(f64::total_cmp);
+        all.get(all.len() * 9 / 10).copied().filter(|of| of.is_finite()).unwrap_or(0.0)
+    };
+    (quantile(speeds), quantile(rates))
 }
 
 /// Whether no robot moves so far in the time: by what is faster than anything in this run.

@@ -45,7 +45,7 @@ pub(super) fn other_extrinsics(
     };
     let extrinsics: Vec<(usize, Pose, [Pose; 2], [f64; 3])> =
         (0..calibrated.tracks.len()).filter_map(of_track).collect();
-    let least = [limits.place_m(), limits.place_m(), MIN_OTHER_EXTRINSICS_RAD];
+    let least = [limits.place_m, limits.place_m, MIN_OTHER_EXTRINSICS_RAD];
     let reference = calibrated.body_from_sensor;
     let components = |pose: &Pose| {
         [pose.x_m - reference.x_m, pose.y_m - reference.y_m, wrap_to_pi(pose.theta_rad - reference.theta_rad)]
