@@ -107,6 +107,12 @@ impl SamplingPeriod {
         self.off_s <= MAX_CERTAIN_LATENESS * self.period_s
     }
 
+    /// Whether no other row has a row's number.
+    #[must_use]
+    pub fn is_alone(&self, row: usize) -> bool {
+        is_alone(&self.numbers, row)
+    }
+
     /// Ticks from a row to the next one: 2 where one row is missing between them.
     #[must_use]
     pub fn ticks_after(&self, row: usize) -> Option<i64> {
@@ -280,6 +286,12 @@ fn likeliest_numbers(t_s: &[f64], period_s: f64) -> (Vec<i64>, f64) {
     (numbers, cost + t_s.len() as f64 * (jitter * period_s).ln())
 }
 
+/// Whether no neighbour has a row's number; numbers do not fall.
+fn is_alone(numbers: &[i64], row: usize) -> bool {
+    let number = Some(&numbers[row]);
+    row.checked_sub(1).is_none_or(|before| numbers.get(before) != number) && numbers.get(row + 1) != number
+}
+
 /// How late each stamp is against the line through the rows around it that are alone of their ticks: one that
 /// came by itself is on no line. Through all of them where hardly any is alone.
 fn lateness(t_s: &[f64], numbers: &[i64], period_s: f64) -> Vec<f64> {
@@ -288,10 +300,8 @@ fn lateness(t_s: &[f64], numbers: &[i64], period_s: f64) -> Vec<f64> {
     let mut sums = Sums::default();
     let (mut from, mut to) = (0, 0);
     let point = |row: usize| (numbers[row] as f64, t_s[row] - period_s * numbers[row] as f64);
-    let differs = |row: usize, next: usize| next == rows || numbers[row] != numbers[next];
-    let is_alone = |row: usize| (row == 0 || differs(row - 1, row)) && differs(row, row + 1);
-    let most_are = (0..rows).filter(|row| is_alone(*row)).count() * 2 > rows;
-    let weight = |row: usize| if is_alone(row) || !most_are { 1.0 } else { 0.0 };
+    let most_are = (0..rows).filter(|row| is_alone(numbers, *row)).count() * 2 > rows;
+    let weight = |row: usize| if is_alone(numbers, row) || !most_are { 1.0 } else { 0.0 };
     let late = |row: usize| {
         while to < rows.min(row + LINE_ROWS + 1) {
             sums.add(point(to), weight(to));

@@ -48,15 +48,18 @@ impl StampError {
 
 /// Whether stamps do not tell in some run of which tick each row is.
 pub(crate) fn have_uncertain_rows(datasets: &[Dataset]) -> bool {
-    uncertain_tick_s(datasets) > 0.0
+    uncertain_ticks_s(datasets).next().is_some()
 }
 
-/// The longest sampling period of the runs in which stamps do not tell of which tick each row is, seconds; 0
-/// where they do in all.
+/// The longest sampling period of such runs, seconds; 0 where there are none.
 pub(crate) fn uncertain_tick_s(datasets: &[Dataset]) -> f64 {
+    uncertain_ticks_s(datasets).fold(0.0, f64::max)
+}
+
+fn uncertain_ticks_s(datasets: &[Dataset]) -> impl Iterator<Item = f64> {
     let runs = datasets.iter().flat_map(|dataset| &dataset.runs);
-    let periods = runs.filter_map(|run| SamplingPeriod::of(&run.odometry.t_s)).filter(|period| !period.is_certain());
-    periods.map(|period| period.period_s).fold(0.0, f64::max)
+    let periods = runs.filter_map(|run| SamplingPeriod::of(&run.odometry.t_s));
+    periods.filter(|period| !period.is_certain()).map(|period| period.period_s)
 }
 
 /// An error of the stamps that counts show by themselves, whatever the instrument says.

@@ -67,7 +67,7 @@ impl Limits {
             MIN_UNKNOWN_ACROSS_SEPARATIONS * separation_m,
             MIN_UNKNOWN_TURN_RAD,
         );
-        let (speed_m_s, rate_rad_s) = brisk_rates(calibrated);
+        let (speed_m_s, rate_rad_s) = if tick_s > 0.0 { brisk_rates(calibrated) } else { (0.0, 0.0) };
         let by_a_tick = tick_s * Residual::new(speed_m_s, speed_m_s, rate_rad_s);
         let place_m = MIN_OTHER_EXTRINSICS_SEPARATIONS * separation_m;
         Self { least: least + by_a_tick, place_m, sigmas: WINDOW_SPANS.iter().map(of_span).collect() }
@@ -163,22 +163,23 @@ impl Limits {
     }
 }
 
+/// Speed and turn rate of the robot from pose to pose of a track, m/s and rad/s.
+fn rates<'c>(calibrated: &'c CalibratedTracks<'_>, track: usize) -> impl Iterator<Item = (f64, f64)> + 'c {
+    let (t_s, poses) = (&calibrated.tracks[track].t_s, calibrated.poses(track));
+    (1..t_s.len()).map(move |to| {
+        let (moved, time_s) = (poses[to - 1].to(poses[to]), t_s[to] - t_s[to - 1]);
+        (moved.x_m.hypot(moved.y_m) / time_s, wrap_to_pi(moved.theta_rad).abs() / time_s)
+    })
+}
+
 /// Speed and turn rate of the robot where it is brisk, by the 90 % quantile, m/s and rad/s.
 fn brisk_rates(calibrated: &CalibratedTracks<'_>) -> (f64, f64) {
-    let (mut speeds, mut rates) = (Vec::new(), Vec::new());
-    for (track, of) in calibrated.tracks.iter().enumerate() {
-        let poses = calibrated.poses(track);
-        for to in 1..of.len() {
-            let (moved, time_s) = (poses[to - 1].to(poses[to]), of.t_s[to] - of.t_s[to - 1]);
-            speeds.push(moved.x_m.hypot(moved.y_m) / time_s);
-            rates.push(wrap_to_pi(moved.theta_rad).abs() / time_s);
-        }
-    }
+    let (speeds, turn_rates) = (0..calibrated.tracks.len()).flat_map(|track| rates(calibrated, track)).unzip();
     let quantile = |mut all: Vec<f64>| {
         all.sort_by(f64::total_cmp);
         all.get(all.len() * 9 / 10).copied().filter(|of| of.is_finite()).unwrap_or(0.0)
     };
-    (quantile(speeds), quantile(rates))
+    (quantile(speeds), quantile(turn_rates))
 }
 
 /// Whether no robot moves so far in the time: by what is faster than anything in this run.
@@ -188,14 +189,8 @@ fn is_too_fast(
     (from, to): (usize, usize),
     displacement: &Residual,
 ) -> bool {
-    let (of, poses) = (&calibrated.tracks[track], calibrated.poses(track));
-    let rates = |(from, to): (usize, usize)| {
-        let (moved, time_s) = (poses[from].to(poses[to]), of.t_s[to] - of.t_s[from]);
-        (moved.x_m.hypot(moved.y_m) / time_s, wrap_to_pi(moved.theta_rad).abs() / time_s)
-    };
-    let fastest = (1..of.len())
-        .map(|to| rates((to - 1, to)))
-        .fold((0.0_f64, 0.0_f64), |most, of| (most.0.max(of.0), most.1.max(of.1)));
+    let of = &calibrated.tracks[track];
+    let fastest = rates(calibrated, track).fold((0.0_f64, 0.0_f64), |most, of| (most.0.max(of.0), most.1.max(of.1)));
     let time_s = IMPLAUSIBLE_SPEED_RATIO * (of.t_s[to] - of.t_s[from]);
     displacement.x.hypot(displacement.y) > fastest.0 * time_s || displacement.z.abs() > fastest.1 * time_s
 }

@@ -149,17 +149,8 @@ fn read_times(stamps_s: &[f64], share: f64, sigma: f64) -> Option<(Vec<f64>, Vec
     }
     let share = if (share - 1.0).abs() <= WHOLE_SHARE_SIGMAS * sigma { 1.0 } else { share.min(1.0) };
     let period = SamplingPeriod::of(stamps_s)?;
-    let mut says = vec![true; stamps_s.len()];
-    if !period.is_certain() {
-        let mut first = 0;
-        for of_tick in period.numbers.chunk_by(|number, next| number == next) {
-            let rows = first..first + of_tick.len();
-            first = rows.end;
-            if rows.len() > 1 {
-                says[rows].fill(false);
-            }
-        }
-    }
+    let is_certain = period.is_certain();
+    let mut says: Vec<bool> = (0..stamps_s.len()).map(|row| is_certain || period.is_alone(row)).collect();
     // The ends of a run stay: what was measured there is compared with them.
     let last = says.len() - 1;
     (says[0], says[last]) = (true, true);
