@@ -93,10 +93,7 @@ impl SamplingPeriod {
         let late_s = lateness(t_s, &numbers, period_s);
         let off_s = root_mean_square(&late_s);
         // Where stamps jitter by more, rows that share a number need not have come by themselves.
-        let mut of_ticks_s = late_s.clone();
-        for row in by_themselves(&numbers, &late_s) {
-            of_ticks_s[row] = 0.0;
-        }
+        let of_ticks_s = lateness_of_ticks(&numbers, &late_s);
         let late_s = if root_mean_square(&of_ticks_s) < MAX_JITTER_BESIDE * period_s { of_ticks_s } else { late_s };
         Some(Self { period_s, numbers, late_s, is_bunched: false, off_s })
     }
@@ -317,17 +314,19 @@ fn lateness(t_s: &[f64], numbers: &[i64], period_s: f64) -> Vec<f64> {
     (0..rows).map(late).collect()
 }
 
-/// Rows that came by themselves: of several with one number all but the nearest to its tick.
-fn by_themselves(numbers: &[i64], late_s: &[f64]) -> Vec<usize> {
-    let mut found = Vec::new();
+/// The lateness of each tick's row: of several with one number the nearest; 0 of the others, which came by
+/// themselves.
+fn lateness_of_ticks(numbers: &[i64], late_s: &[f64]) -> Vec<f64> {
+    let mut of_ticks_s = vec![0.0; late_s.len()];
     let mut first = 0;
     for of_tick in numbers.chunk_by(|number, next| number == next) {
         let rows = first..first + of_tick.len();
         first = rows.end;
-        let nearest = rows.clone().min_by(|a, b| late_s[*a].abs().total_cmp(&late_s[*b].abs()));
-        found.extend(rows.filter(|row| Some(*row) != nearest));
+        if let Some(nearest) = rows.min_by(|a, b| late_s[*a].abs().total_cmp(&late_s[*b].abs())) {
+            of_ticks_s[nearest] = late_s[nearest];
+        }
     }
-    found
+    of_ticks_s
 }
 
 /// Sums of a line through points.
