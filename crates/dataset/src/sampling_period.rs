@@ -314,8 +314,7 @@ fn lateness(t_s: &[f64], numbers: &[i64], period_s: f64) -> Vec<f64> {
     (0..rows).map(late).collect()
 }
 
-/// The lateness of each tick's row: of several with one number the nearest; 0 of the others, which came by
-/// themselves.
+/// The lateness of each tick's row, the nearest of several; 0 of the others, which came by themselves.
 fn lateness_of_ticks(numbers: &[i64], late_s: &[f64]) -> Vec<f64> {
     let mut of_ticks_s = vec![0.0; late_s.len()];
     let mut first = 0;
