@@ -139,7 +139,7 @@ impl Page<'_> {
     }
 
     fn alternatives(&self, page: &mut String) -> std::fmt::Result {
-        let detectable = self.alternatives.iter().filter(|alternative| alternative.status != Status::NotDetectable);
+        let detectable = self.alternatives.iter().filter(|alternative| alternative.status.is_tested());
         let (standing, others): (Vec<_>, Vec<_>) =
             detectable.partition(|alternative| alternative.status != Status::NotSignificant);
         if standing.is_empty() && others.is_empty() {

@@ -16,7 +16,7 @@ fn meaning(id: &str) -> String {
 
 /// Which other causes were tried, and what speaks against them.
 pub(super) fn alternatives(alternatives: &[Alternative], document: &Document) -> Section {
-    let detectable = alternatives.iter().filter(|alternative| alternative.status != Status::NotDetectable);
+    let detectable = alternatives.iter().filter(|alternative| alternative.status.is_tested());
     let (standing, others): (Vec<_>, Vec<_>) =
         detectable.partition(|alternative| alternative.status != Status::NotSignificant);
     let mut section = Section::new("alternatives", "What else could it be?");

@@ -241,3 +241,18 @@ fn what_happens_in_single_runs_is_named_with_them_and_nothing_else_is_found() {
     // A campaign prints its share; one robot of each kind is right.
     assert!(robots > 1 || wrong.is_empty(), "{wrong:#?}");
 }
+
+#[test]
+fn what_the_encoders_do_not_resolve_is_said() {
+    let changes: &[(bool, Change)] = &[(true, |of| (of.ticks_per_rev, of.odometry_hz) = (30.0, 5.0)), (false, |_| {})];
+    for (&is_coarse, _, document) in diagnosed_all(changes) {
+        let document = document.expect("a diagnosis");
+        let is_unresolved = |id: &str| {
+            let of = document.sensitivity.iter().find(|of| of.id == id).expect("an effect of the catalogue");
+            of.smallest_detectable.is_none() && of.why.starts_with("not resolved by these encoders")
+        };
+        // Counts of 17 mm at 5 Hz do not say how slowly a wheel turns; clocks and places they do.
+        assert_eq!(is_unresolved("low_speed_truncation"), is_coarse, "{:?}", shown(&document));
+        assert!(!is_unresolved("clock_rate") && !is_unresolved("truth_lever_arm"));
+    }
+}

@@ -44,12 +44,20 @@ pub enum Status {
     /// It is not detectable in these data.
     #[serde(rename = "not_shown")]
     NotDetectable,
+    /// The encoders do not resolve what it goes by.
+    NotResolved,
     /// It is significant alone, and refused.
     #[serde(untagged)]
     Refused(Refusal),
 }
 
 impl Status {
+    /// Was it tested: is it detectable in these data, and do the encoders resolve it?
+    #[must_use]
+    pub const fn is_tested(self) -> bool {
+        !matches!(self, Self::NotDetectable | Self::NotResolved)
+    }
+
     /// It in words.
     #[must_use]
     pub const fn text(self) -> &'static str {
@@ -67,9 +75,14 @@ impl Status {
             Self::Refused(Refusal::DriftsMore) => "significant, but odometry drifts more with it on held-out runs",
             Self::NotSignificant => "not significant",
             Self::NotDetectable => "not detectable in these data",
+            Self::NotResolved => NOT_RESOLVED,
         }
     }
 }
+
+/// Why a term is none that the data can tell of.
+pub(crate) const NOT_RESOLVED: &str =
+    "not resolved by these encoders: the speeds that it goes by are mostly rounding of counts";
 
 /// The alternatives, most probable first.
 pub(crate) fn alternatives(
@@ -94,6 +107,8 @@ pub(crate) fn alternatives(
                 Status::Found
             } else if findings.iter().any(|finding| finding.names(&Cause::Effect(id))) {
                 Status::NotDiscriminated
+            } else if !entry.scored.resolved {
+                Status::NotResolved
             } else if entry.scored.dimensions == 0 {
                 Status::NotDetectable
             } else if entry.p_value * tests > SCAN_LEVEL {

@@ -3,6 +3,7 @@
 //! A size is detected with probability 0.9 at a false-positive rate of 1e-3 when √λ = 4.57. The test is a
 //! score test; λ = size² of the projected information.
 
+use crate::alternatives::NOT_RESOLVED;
 use crate::augmented_model::AugmentedModel;
 use crate::candidate::Candidate;
 use crate::document::{Blind, Smallest};
@@ -29,6 +30,9 @@ pub(crate) fn detectability(
             .filter(|(_, size)| size.is_finite())
             .min_by(|a, b| (a.1 / a.0.prior_sigma).total_cmp(&(b.1 / b.0.prior_sigma)));
         let entry = match smallest {
+            _ if !scored.resolved => {
+                (Blind { id: id.to_owned(), why: NOT_RESOLVED.to_owned(), smallest_detectable: None }, f64::INFINITY)
+            }
             // A million times what would be large is rounding, not information.
             Some((parameter, size)) if size < MAX_DETECTION_LIMIT_PRIOR_SIGMAS * parameter.prior_sigma => {
                 // A ratio has no unit in print.

@@ -6,6 +6,7 @@ use estimation::ModelFit;
 
 use crate::augmented_model::{AugmentedModel, others, without};
 use crate::candidate::Candidate;
+use crate::reliability::unresolved;
 use crate::scan::{Scored, scan};
 
 /// Scans of the catalogue's other effects beside models, and fits of models, on one base.
@@ -13,6 +14,8 @@ use crate::scan::{Scored, scan};
 pub(crate) struct FitCache<'a> {
     scans: Vec<(Vec<Candidate>, Vec<Scored>)>,
     fits: Vec<Arc<AugmentedModel<'a>>>,
+    /// What the encoders do not resolve, by the first scan.
+    unresolved: Option<Vec<Candidate>>,
 }
 
 impl<'a> FitCache<'a> {
@@ -22,7 +25,12 @@ impl<'a> FitCache<'a> {
         let at = known.unwrap_or_else(|| {
             let is_chosen = |candidate: &Candidate| model.candidates.iter().any(|chosen| chosen.id() == candidate.id());
             let left: Vec<Candidate> = catalogue.iter().filter(|candidate| !is_chosen(candidate)).cloned().collect();
-            self.scans.push((model.candidates.clone(), scan(&model.fit, &model.candidates, &left)));
+            let scored = scan(&model.fit, &model.candidates, &left);
+            let unresolved = self.unresolved.get_or_insert_with(|| unresolved(&model.fit, &model.candidates, &scored));
+            let resolved = |scored: Scored| {
+                if unresolved.contains(&scored.candidate) { scored.unresolved() } else { scored }
+            };
+            self.scans.push((model.candidates.clone(), scored.into_iter().map(resolved).collect()));
             self.scans.len() - 1
         });
         &self.scans[at].1

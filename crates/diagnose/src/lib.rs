@@ -47,6 +47,7 @@ mod pose_windows;
 mod profile;
 mod ranking;
 mod record_faults;
+mod reliability;
 mod residual_tests;
 mod residuals;
 mod rivals;

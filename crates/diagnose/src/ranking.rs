@@ -78,6 +78,7 @@ pub(crate) mod tests {
             p_value: if dimensions > 0 { p_of_chi_square(statistic, dimensions as f64) } else { 1.0 },
             estimates: Vec::new(),
             log_odds,
+            resolved: true,
         }
     }
 

@@ -32,17 +32,37 @@ pub(crate) struct Scored {
     pub(crate) estimates: Vec<(f64, f64)>,
     /// Log Bayes factor of the effect over none, with a normal prior of the sizes about zero.
     pub(crate) log_odds: f64,
+    /// Do the encoders resolve what it goes by? What they do not has no dimension.
+    pub(crate) resolved: bool,
+}
+
+impl Scored {
+    /// The test of a term that the encoders do not resolve: none.
+    pub(crate) fn unresolved(self) -> Self {
+        Self {
+            dimensions: 0,
+            statistic: 0.0,
+            p_value: 1.0,
+            estimates: Vec::new(),
+            log_odds: 0.0,
+            resolved: false,
+            ..self
+        }
+    }
+}
+
+/// A candidate's information in units of what is plausible.
+pub(crate) fn prior_scaled(information: &DMatrix<f64>, parameters: &[TermParameter]) -> DMatrix<f64> {
+    let of = |i: usize, j: usize| information[(i, j)] * parameters[i].prior_sigma * parameters[j].prior_sigma;
+    DMatrix::from_fn(parameters.len(), parameters.len(), of)
 }
 
 /// A candidate's information and gradient in units of what is plausible, along its principal directions:
 /// eigenvalue and gradient of each.
 fn principal(information: &DMatrix<f64>, gradient: &DVector<f64>, parameters: &[TermParameter]) -> Vec<(f64, f64)> {
     let prior_sigma = DVector::from_fn(parameters.len(), |k, _| parameters[k].prior_sigma);
-    let scaled = DMatrix::from_fn(parameters.len(), parameters.len(), |i, j| {
-        information[(i, j)] * prior_sigma[i] * prior_sigma[j]
-    });
     let scaled_gradient = gradient.component_mul(&prior_sigma);
-    let eigen = scaled.symmetric_eigen();
+    let eigen = prior_scaled(information, parameters).symmetric_eigen();
     (0..parameters.len()).map(|k| (eigen.eigenvalues[k], eigen.eigenvectors.column(k).dot(&scaled_gradient))).collect()
 }
 
@@ -203,6 +223,7 @@ fn score_test(
         p_value,
         estimates,
         log_odds,
+        resolved: true,
     }
 }
 

@@ -11,6 +11,7 @@ use crate::gain::gain;
 use crate::geometry_deviations::keeps_wheels;
 use crate::model_comparison::{form_error_statistic, log_bayes_factor, regated};
 use crate::null_distribution::NullDistribution;
+use crate::reliability::unresolved;
 use crate::scan::{Scored, scan};
 use crate::settings::levels::SPARSE_TERM_LEVEL;
 use crate::settings::search::{MAX_SPARSE_REFITS, MAX_SPARSE_TERMS};
@@ -242,6 +243,9 @@ fn best_first(base: &ModelFit<'_>, model: &AugmentedModel<'_>) -> Option<(Vec<Sc
     let mut scored: Vec<Scored> =
         scan(&model.fit, &model.candidates, &library).into_iter().filter(|scored| scored.dimensions > 0).collect();
     scored.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
+    let best = (2 * MAX_SPARSE_REFITS).min(scored.len());
+    let unresolved = unresolved(&model.fit, &model.candidates, &scored[..best]);
+    scored.retain(|scored| !unresolved.contains(&scored.candidate));
     if let Some(null) = NullDistribution::of(model) {
         deflate_best(&null, &mut scored);
     }

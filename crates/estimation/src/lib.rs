@@ -53,6 +53,7 @@ mod predicted_information;
 mod products;
 mod profile;
 mod propagation;
+mod rate_noise;
 mod records;
 mod resimulation;
 mod rounding;

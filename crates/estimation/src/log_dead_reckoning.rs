@@ -69,6 +69,7 @@ impl<'a> LogDeadReckoning<'a> {
             measurements: Vec::new(),
             wheel_rad: track.first_rad(),
             quantum_rad: track.quantum_rad(),
+            rate_window: track.rate_window(),
             session_m,
         };
         Some(Self { segment, instants, distance_m: track.distance_m(robot) })

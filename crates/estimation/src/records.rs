@@ -73,6 +73,7 @@ impl<'a> Records<'a> {
                         measurements: Vec::new(),
                         wheel_rad: track.first_rad(),
                         quantum_rad: track.quantum_rad(),
+                        rate_window: track.rate_window(),
                         session_m,
                     };
                     add_poses(&mut records.segments, &base, &track, run.run(), measured_poses(run, reference));

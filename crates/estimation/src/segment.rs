@@ -7,6 +7,7 @@ use crate::model::Model;
 use crate::noise_shape::NoiseShape;
 use crate::settings::{SPEED_CHANGE_RATIO, SPEED_CHANGE_WINDOW_S, TIME_TOLERANCE_S};
 use crate::wheel_angles::WheelInterval;
+use crate::wheel_rates::RateWindow;
 
 /// A pose that the instrument measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,6 +50,7 @@ pub struct Segment<'a> {
     pub(crate) wheel_rad: Wheels<f64>,
     /// What a count of each wheel stands for, radians; 0 where angles are not rounded.
     pub(crate) quantum_rad: Wheels<f64>,
+    pub(crate) rate_window: RateWindow,
     /// Distance driven in the session before, metres, by nominal values.
     pub(crate) session_m: f64,
 }

@@ -9,7 +9,7 @@ use dataset::{NominalRobot, RunView, SamplingPeriod, WheelLog, row_jitter_s};
 use kinematics::{Count, Wheels};
 
 use crate::settings::{MAX_EXTRAPOLATION, ROWS_OF_CHANGE, TIME_TOLERANCE_S};
-use crate::wheel_rates::{WheelRates, are_inexact, quantum_of_angles};
+use crate::wheel_rates::{RateWindow, WheelRates, are_inexact, quantum_of_angles};
 
 /// A stretch of the log within one row.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -161,6 +161,11 @@ impl<'a> WheelAngleInterpolator<'a> {
     /// Radians that a count of each wheel stands for; 0 where angles are not rounded.
     pub(crate) const fn quantum_rad(&self) -> Wheels<f64> {
         self.rates.quantum_rad
+    }
+
+    /// How rates are found, as [`Segment`](crate::segment::Segment) keeps it.
+    pub(crate) const fn rate_window(&self) -> RateWindow {
+        RateWindow { rows: self.rates.window, row_by_row: self.rates.row_by_row }
     }
 
     /// A reader that goes through the log once.

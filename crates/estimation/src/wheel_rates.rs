@@ -24,12 +24,23 @@ pub(crate) struct WheelRates {
     pub(crate) row_by_row: bool,
     /// Radians that a count stands for; 0 where angles are not rounded.
     pub(crate) quantum_rad: Wheels<f64>,
+    /// Rows before a row by which its rates are found, and as many after.
+    pub(crate) window: usize,
     /// First rows of the stretches without a gap, in order.
     starts: Vec<usize>,
     /// Rows between which and the one before a count came, in order.
     counted: Vec<usize>,
     /// Time that a robot which sets off gently takes for a count, seconds; `None` where there are no counts.
     count_s: Option<f64>,
+}
+
+/// How the rates at the rows of a run are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct RateWindow {
+    /// Rows before a row, and as many after.
+    pub(crate) rows: usize,
+    /// An interval's own counts say its rates.
+    pub(crate) row_by_row: bool,
 }
 
 impl WheelRates {
@@ -73,6 +84,7 @@ impl WheelRates {
             variance.map(|variance| variance / squares)
         };
         let mut rates = of_window(RATE_WINDOWS[0]);
+        let mut window = RATE_WINDOWS[0];
         for pair in RATE_WINDOWS.windows(2) {
             let [now, wider] = [noise(pair[0]), noise(pair[1])];
             if is_below_signal(&rates, now, separation_m, m_per_rad) || variance == [0.0; 2] {
@@ -86,7 +98,7 @@ impl WheelRates {
             if blurs {
                 break;
             }
-            rates = next;
+            (rates, window) = (next, pair[1]);
         }
         let [left, right] = rates;
         let starts = pieces.iter().map(|piece| piece.start).collect();
@@ -95,7 +107,7 @@ impl WheelRates {
         let counted = if is_rounded { (1..t_s.len()).filter(came).collect() } else { Vec::new() };
         let count_m = [0, 1].map(|side| quanta[side] * m_per_rad[side]).into_iter().fold(0.0, f64::max);
         let count_s = is_rounded.then(|| (2.0 * count_m / GENTLE_ACCELERATION_M_S2).sqrt());
-        Self { at_rows_rad_s: Wheels { left, right }, row_by_row, quantum_rad, starts, counted, count_s }
+        Self { at_rows_rad_s: Wheels { left, right }, row_by_row, quantum_rad, window, starts, counted, count_s }
     }
 
     /// Comes no count in a part of a row's interval, nor within the time that a robot which sets off gently
@@ -164,7 +176,7 @@ fn is_below_signal(rates: &[Vec<f64>; 2], noise: [f64; 2], separation_m: f64, m_
 
 /// Slope of a local regression at each row, over as many rows before as after, up to `half`, and none beyond
 /// the piece of the log; at the piece's ends, over as many rows as are to one side.
-fn slopes(t_s: &[f64], turn_rad: &[f64], pieces: &[std::ops::Range<usize>], half: usize) -> Vec<f64> {
+pub(crate) fn slopes(t_s: &[f64], turn_rad: &[f64], pieces: &[std::ops::Range<usize>], half: usize) -> Vec<f64> {
     let mut slopes = vec![0.0; t_s.len()];
     for piece in pieces {
         let last = piece.end - 1;
@@ -230,7 +242,7 @@ fn share_of_true_stamps(t_s: &[f64], turn_rad: &Wheels<Vec<f64>>) -> f64 {
 }
 
 /// Stretches of rows without a gap; in a log with gaps each row stands alone.
-fn pieces(t_s: &[f64], continuous: bool) -> Vec<std::ops::Range<usize>> {
+pub(crate) fn pieces(t_s: &[f64], continuous: bool) -> Vec<std::ops::Range<usize>> {
     let longest_s = if continuous {
         GAP_RATIO * median(t_s.windows(2).map(|pair| pair[1] - pair[0])).unwrap_or(f64::INFINITY)
     } else {

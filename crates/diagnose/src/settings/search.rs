@@ -50,6 +50,12 @@ pub(crate) const MIN_TAKEN_FRACTION: f64 = 0.5;
 /// Tuned: by hand; no record of what on.
 pub(crate) const MAX_CANDIDATES_TRIED: usize = 3;
 
+/// Share of the motion in a term's information, the rest being the rounding of counts in the rates that it
+/// goes by, below which the encoders do not resolve it.
+/// Budgeted: below it a size is nearer to nothing than to the truth. At 0.9 drifting clocks and delays that
+/// large logs show well are lost to coarse encoders, and what is not in the catalogue comes in their place.
+pub(crate) const MIN_RELIABILITY: f64 = 0.5;
+
 /// Half-widths of the 95 % interval. An effect is refused if odometry drifts more with it by more; at one
 /// half-width an effect that leaves the drift alone would be refused once in forty times.
 /// Tuned: by hand; no record of what on.

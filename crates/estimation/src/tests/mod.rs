@@ -21,6 +21,7 @@ mod one_step;
 mod partial;
 mod partial_poses;
 mod path_shape;
+mod rate_noise;
 mod rounding;
 mod scores;
 mod selection;
