@@ -28,6 +28,7 @@ mod kinematic_samples;
 mod layout;
 mod log_dead_reckoning;
 mod map_distortion;
+mod map_functions;
 mod maximum_likelihood;
 mod model;
 mod model_fit;
