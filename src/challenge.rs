@@ -34,9 +34,13 @@ pub(crate) struct Arguments {
     /// Hide large effects alone: one of the mean in each case, at ten to a hundred of its detection limits.
     #[arg(long, conflicts_with = "check")]
     large: bool,
+    /// Hide one effect of the mean in one long log each, and diagnose it as it is and cut into runs at its
+    /// stops.
+    #[arg(long, conflicts_with_all = ["check", "large"])]
+    one_log: bool,
     /// See every case by one instrument: capture, slam, gyro-tape, wall or revisit. Even cases are nulls, odd
     /// ones hide one effect that the instrument can show.
-    #[arg(long, value_name = "NAME", conflicts_with_all = ["check", "large"])]
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["check", "large", "one_log"])]
     instrument: Option<CaseInstrument>,
     /// Drive part I of N only and leave it in the folder of --out; --merge puts the parts together. auto: as
     /// of yair sweep.
@@ -44,7 +48,7 @@ pub(crate) struct Arguments {
     shard: Option<ShardChoice>,
     /// Put the parts of a campaign in these folders together, in any order; the result is that of one
     /// machine, to the bit.
-    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["cases", "seed", "case", "large", "instrument", "shard", "out", "jobs"])]
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["cases", "seed", "case", "large", "one_log", "instrument", "shard", "out", "jobs"])]
     merge: Vec<PathBuf>,
     /// Write the datasets of --case, one folder a session, or the part of --shard into this folder.
     #[arg(long, value_name = "DIR", requires = "writes")]
@@ -80,6 +84,9 @@ impl Arguments {
     fn scope(&self) -> Scope {
         if let Some(instrument) = self.instrument {
             return Scope::Instrument(instrument);
+        }
+        if self.one_log {
+            return Scope::OneLog;
         }
         match (self.large, self.check.is_some()) {
             (true, _) => Scope::Large,

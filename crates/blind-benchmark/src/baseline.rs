@@ -16,7 +16,7 @@ use std::path::Path;
 
 use statrs::distribution::{Binomial, DiscreteCDF};
 
-use super::case::CaseKind;
+use super::case_kind::CaseKind;
 use super::error::ChallengeError;
 use super::measure::{is_first_name_right, is_plain};
 use super::result::CaseResult;

@@ -6,9 +6,11 @@ use effects::Needs;
 use kinematics::DriveGeometry;
 
 use super::case_instrument::CaseInstrument;
+use super::case_kind::CaseKind;
 use super::conditions::Conditions;
 #[cfg(test)]
 use super::conditions::Stamps;
+use super::cut_log::{self, Stops};
 use super::draw::{CaseDraws, Draw};
 use super::drive::{DriveContext, HELD_OUT_RUN, OTHER_SESSION, PLANNED, drive, mean_square_motion};
 use super::hidden::{EffectKind, Hidden, hideable};
@@ -19,64 +21,6 @@ use super::robot::{RandomRobot, SessionPlan};
 use crate::error::ChallengeError;
 use crate::oracle_view::{OracleView, form_share, has_random_signature, known_noncentrality, size_ratio, view};
 use crate::scope::Scope;
-
-/// What a case asks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum CaseKind {
-    /// Nothing is hidden.
-    Null,
-    /// One effect is hidden.
-    Single,
-    /// Two effects are hidden.
-    Pair,
-    /// One effect is hidden, and the catalogue is without it.
-    LeftOut,
-    /// One effect of the mean is hidden, at ten detection limits and more.
-    Large,
-}
-
-/// A block of cases: of each twenty, so many are nulls, singles, pairs; the others leave an effect out.
-const BLOCK: u64 = 20;
-const NULLS: u64 = 7;
-const SINGLES: u64 = 7;
-const PAIRS: u64 = 2;
-
-impl CaseKind {
-    /// The kind of a case in a campaign, and which of its kind it is.
-    pub(crate) const fn in_scope(scope: Scope, number: u64) -> (Self, u64) {
-        match scope {
-            Scope::Large => (Self::Large, number),
-            Scope::Instrument(_) => (if number.is_multiple_of(2) { Self::Null } else { Self::Single }, number / 2),
-            Scope::Whole | Scope::Guarded => Self::of(number),
-        }
-    }
-
-    /// The same where kinds mix.
-    pub(crate) const fn of(number: u64) -> (Self, u64) {
-        let (block, index) = (number / BLOCK, number % BLOCK);
-        if index < NULLS {
-            (Self::Null, block * NULLS + index)
-        } else if index < NULLS + SINGLES {
-            (Self::Single, block * SINGLES + index - NULLS)
-        } else if index < NULLS + SINGLES + PAIRS {
-            (Self::Pair, block * PAIRS + index - NULLS - SINGLES)
-        } else {
-            let left = NULLS + SINGLES + PAIRS;
-            (Self::LeftOut, block * (BLOCK - left) + index - left)
-        }
-    }
-}
-
-/// Whether a case is of those that a baseline guards: the nulls, which are quick, and the single effects of
-/// every second block.
-pub(crate) const fn is_guarded(number: u64) -> bool {
-    match CaseKind::of(number).0 {
-        CaseKind::Null => true,
-        CaseKind::Single => (number / BLOCK).is_multiple_of(2),
-        CaseKind::Pair | CaseKind::LeftOut | CaseKind::Large => false,
-    }
-}
 
 /// A case ready to be diagnosed.
 pub(crate) struct Case {
@@ -90,6 +34,8 @@ pub(crate) struct Case {
     pub(crate) hidden: Vec<Hidden>,
     pub(crate) oracle: Vec<OracleView>,
     pub(crate) datasets: Vec<Dataset>,
+    /// Where each is cut into runs, where that is asked.
+    stops: Vec<Stops>,
     /// The held-out log, without noise, and the same without the effects.
     pub(crate) held_out: Option<(Dataset, Dataset)>,
     /// The held-out log with one effect alone, for each of the catalogue's form with a random signature: its
@@ -111,9 +57,9 @@ enum Attempt {
     Unresolved,
 }
 
-/// Sizes over the detection limit: of singles, and of pairs, which ask for names and not for power.
+/// Sizes over the detection limit: of singles, and where names are asked for and not power.
 const SINGLE_RATIOS: (f64, f64) = (0.3, 10.0);
-const PAIR_RATIOS: (f64, f64) = (1.6, 10.0);
+const NAMED_RATIOS: (f64, f64) = (1.6, 10.0);
 /// The same of large effects, as far as a real robot may have them.
 const LARGE_RATIOS: (f64, f64) = (10.0, 100.0);
 /// A size that cannot be chosen closer to the ratio wanted than this is drawn again.
@@ -132,8 +78,9 @@ impl Case {
         let (case_kind, index) = CaseKind::in_scope(scope, number);
         let mut unresolved_robots = 0;
         for attempt in 0..ATTEMPTS {
-            // Two that show on the same paths, or one that the instrument can see, are drawn anew until met.
-            let is_drawn_anew = case_kind == CaseKind::Pair || scope.instrument().is_some();
+            // Two that show on the same paths, or one that the instrument or one log can show, are drawn anew
+            // until met.
+            let is_drawn_anew = matches!(case_kind, CaseKind::Pair | CaseKind::OneLog) || scope.instrument().is_some();
             let ids = Self::ids(seed, number, case_kind, index, if is_drawn_anew { attempt } else { 0 });
             match Self::attempt(CaseDraws { seed, case: number, attempt }, case_kind, scope.instrument(), &ids)? {
                 Attempt::Ready(case) => return Ok(Ok(Self { unresolved_robots, ..*case })),
@@ -165,7 +112,7 @@ impl Case {
         match case_kind {
             CaseKind::Null => Vec::new(),
             CaseKind::Single => vec![one(0.1, 0.15)],
-            CaseKind::Large => vec![one(0.0, 0.0)],
+            CaseKind::Large | CaseKind::OneLog => vec![one(0.0, 0.0)],
             CaseKind::Pair => {
                 let first = one(0.0, 0.0);
                 let mut second = one(0.0, 0.0);
@@ -186,7 +133,13 @@ impl Case {
     ) -> Result<Attempt, ChallengeError> {
         let CaseDraws { seed, case: number, .. } = draws;
         let needs = ids.iter().fold(Needs::default(), |all, id| all.and(Hidden::needs(id)));
-        let drawn = Conditions::draw(draws, needs, ids);
+        if case_kind == CaseKind::OneLog && needs.payload {
+            return Ok(Attempt::Undetectable); // a load is one for a run
+        }
+        let mut drawn = Conditions::draw(draws, needs, ids);
+        if case_kind == CaseKind::OneLog {
+            drawn.runs = 1;
+        }
         let conditions = instrument.map_or(drawn, |instrument| instrument.conditions(drawn));
         let instrument_model = match instrument {
             Some(instrument) => instrument.model(&conditions),
@@ -213,18 +166,24 @@ impl Case {
         };
         let truth = robot.sessions[0].scenario.true_geometry().map_err(sim_yair::SimulationError::from)?;
         let ratios = match case_kind {
-            CaseKind::Pair => PAIR_RATIOS,
+            CaseKind::Pair | CaseKind::OneLog => NAMED_RATIOS,
             CaseKind::Large => LARGE_RATIOS,
             CaseKind::Null | CaseKind::Single | CaseKind::LeftOut => SINGLE_RATIOS,
         };
+        let mut stops: Vec<Stops> = Vec::new();
         let weak = hidden.iter().any(|hidden| hidden.kind != EffectKind::RecordFault);
         let plain = if weak { drive(&robot.sessions, &measurement, &[], false, 0)? } else { Vec::new() };
+        if case_kind == CaseKind::OneLog {
+            stops = plain.iter().map(cut_log::stops).collect();
+        }
+        // An effect of one log is as large as the cut one shows it, where every run starts anew.
+        let plain = cut_into_runs(plain, &stops);
         let noise = TrueNoise::of(&conditions, &instrument_model, mean_square_motion(&plain));
         let (mut detectability, mut rounding_shares) = (Vec::new(), Vec::new());
         for effect in &mut hidden {
             let measured = |effect: &Hidden, noise: TrueNoise| -> Result<Option<Detectability>, ChallengeError> {
                 let exact = drive(&robot.sessions, &measurement, &[effect], false, 0)?;
-                Ok(Detectability::of(&exact, &plain, &truth, noise))
+                Ok(Detectability::of(&cut_into_runs(exact, &stops), &plain, &truth, noise))
             };
             match scale(effect, &mut draw, ratios, |effect| measured(effect, noise))? {
                 Chosen::RecordFault => detectability.push(None),
@@ -283,6 +242,7 @@ impl Case {
             hidden,
             oracle,
             datasets,
+            stops,
             held_out,
             held_out_random,
             best_drive,
@@ -308,6 +268,11 @@ impl Case {
         };
         let rivals = detectability.rivals(effect.id, known_noncentrality(effect, &detectability));
         Ok(Some(FurtherRuns { datasets: drive(plans, &measurement, &[effect], true, PLANNED)?, rivals }))
+    }
+
+    /// Its long logs cut into runs; none where that is not asked.
+    pub(crate) fn cut(&self) -> Vec<Dataset> {
+        self.datasets.iter().zip(&self.stops).map(|(dataset, stops)| cut_log::cut_at(dataset, stops)).collect()
     }
 
     /// The session on other paths, without noise.
@@ -337,6 +302,14 @@ impl Case {
 pub(crate) struct FurtherRuns {
     pub(crate) datasets: Vec<Dataset>,
     pub(crate) rivals: Vec<(&'static str, f64)>,
+}
+
+/// Logs cut into runs, where that is asked.
+fn cut_into_runs(logs: Vec<Dataset>, stops: &[Stops]) -> Vec<Dataset> {
+    if stops.is_empty() {
+        return logs;
+    }
+    logs.iter().zip(stops).map(|(log, stops)| cut_log::cut_at(log, stops)).collect()
 }
 
 enum Chosen {

@@ -12,7 +12,9 @@
 mod baseline;
 mod case;
 mod case_instrument;
+mod case_kind;
 mod conditions;
+mod cut_log;
 mod draw;
 mod drive;
 mod error;
@@ -43,8 +45,8 @@ use rayon::prelude::*;
 use case::Case;
 
 pub use baseline::{DiagnosisBaseline, DiagnosisCheck, FALSE_ALARM_BUDGET, Guard, Guarded};
-pub use case::CaseKind;
 pub use case_instrument::CaseInstrument;
+pub use case_kind::CaseKind;
 pub use error::ChallengeError;
 pub use hidden::EffectKind;
 pub use instrument::{NoiseClass, TruthKind};
@@ -118,12 +120,13 @@ pub fn challenge_case(
     }
 }
 
-/// The datasets of one case, as the tool gets them.
+/// The datasets of one case, as the tool gets them; behind one long log the same cut into runs.
 ///
 /// # Errors
 /// As [`challenge_case`].
 pub fn challenge_datasets(scope: Scope, seed: u64, number: u64) -> Result<Vec<dataset::Dataset>, ChallengeError> {
-    Ok(Case::draw(scope, seed, number)?.map(|case| case.datasets).unwrap_or_default())
+    let of = |case: Case| case.datasets.iter().cloned().chain(case.cut()).collect();
+    Ok(Case::draw(scope, seed, number)?.map(of).unwrap_or_default())
 }
 
 /// What came of a case.
@@ -165,7 +168,7 @@ pub fn challenge_outcomes(
 ) -> Result<Vec<CaseOutcome>, ChallengeError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build();
     let pool = pool.map_err(|error| ChallengeError::Threads { jobs, why: error.to_string() })?;
-    let is_included = |number: &u64| scope != Scope::Guarded || case::is_guarded(*number);
+    let is_included = |number: &u64| scope != Scope::Guarded || case_kind::is_guarded(*number);
     let one = |number| {
         let result = challenge_case(scope, seed, number);
         done();

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use super::case::CaseKind;
+use super::case_kind::CaseKind;
 use super::hidden::EffectKind;
 use super::instrument::NoiseClass;
 use super::measure_value::{Measure, share};
@@ -115,6 +115,7 @@ pub(crate) fn measures_with(seed: u64, cases: &[CaseResult], bar_of_nulls: f64) 
     ));
     measures.push(other_session(cases));
     measures.extend(large(cases));
+    measures.extend(one_log(cases));
     measures.extend(probabilities(cases));
     measures
 }
@@ -166,6 +167,26 @@ fn large(cases: &[CaseResult]) -> Vec<Measure> {
             true,
         ),
     ]
+}
+
+/// Whether one long log and the same cut into runs have the same name first, where either has one.
+fn one_log(cases: &[CaseResult]) -> Option<Measure> {
+    let first = |mut findings: Box<dyn Iterator<Item = &Reported> + '_>| findings.next()?.names.first().cloned();
+    let names: Vec<[Option<String>; 2]> = cases
+        .iter()
+        .filter(|case| case.case_kind == CaseKind::OneLog)
+        .map(|case| [first(Box::new(case.findings())), first(Box::new(case.findings_of_cut()))])
+        .filter(|[whole, cut]| whole.is_some() || cut.is_some())
+        .collect();
+    (!names.is_empty()).then(|| {
+        share(
+            "same_first_name",
+            "findings whose first name is the same in one long log and in the same log cut into runs",
+            count(names.iter(), |[whole, cut]: &[Option<String>; 2]| whole == cut),
+            0.9,
+            false,
+        )
+    })
 }
 
 /// A single effect counts as plain at this many detection limits, the bar on the power's ratio.

@@ -1,7 +1,7 @@
 //! How large an effect must be to be detected, in units of the oracle's detection limit: where the best
 //! monotone curve of detection over size crosses 90 %, with a bootstrap over cases.
 
-use super::case::CaseKind;
+use super::case_kind::CaseKind;
 use super::draw::Draw;
 use super::hidden::EffectKind;
 use super::instrument::NoiseClass;

@@ -3,7 +3,8 @@
 use diagnose::Document;
 use effects::OrdinaryCondition;
 
-use super::case::{Case, CaseKind};
+use super::case::Case;
+use super::case_kind::CaseKind;
 use super::hidden::EffectKind;
 use super::instrument::{NoiseClass, TruthKind};
 use super::oracle_view::OracleView;
@@ -55,6 +56,9 @@ pub struct CaseResult {
     /// What was found.
     #[serde(rename = "said")]
     pub reported: Vec<Reported>,
+    /// What was found in the same log cut into runs, where that was asked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub said_of_cut: Option<Vec<Reported>>,
     /// Checks that failed at the end.
     pub failed_checks: Vec<String>,
     /// Why there is no diagnosis.
@@ -84,10 +88,18 @@ impl CaseResult {
 
     /// The findings that are not right anyway in the case's conditions.
     pub fn findings(&self) -> impl Iterator<Item = &Reported> {
+        self.not_exempt(&self.reported)
+    }
+
+    /// The same of the log cut into runs; none where that was not asked.
+    pub(crate) fn findings_of_cut(&self) -> impl Iterator<Item = &Reported> {
+        self.not_exempt(self.said_of_cut.as_deref().unwrap_or_default())
+    }
+
+    fn not_exempt<'a>(&'a self, all: &'a [Reported]) -> impl Iterator<Item = &'a Reported> {
         let right = self.right_findings();
         let hidden = |name: &str| self.hidden.iter().any(|hidden| hidden.id == name);
-        self.reported
-            .iter()
+        all.iter()
             .filter(move |reported| !reported.names.iter().any(|name| right.contains(&name.as_str()) && !hidden(name)))
     }
 

@@ -13,6 +13,9 @@ pub enum Scope {
     /// Single effects of the mean at ten to a hundred of their detection limits, whatever the number; no
     /// gains and no planned runs.
     Large,
+    /// Single effects of the mean in one long log, whatever the number, diagnosed as it is and cut into runs;
+    /// no gains and no planned runs.
+    OneLog,
     /// Nulls and single effects by turns, all seen by one instrument; no gains and no planned runs.
     Instrument(CaseInstrument),
 }
@@ -22,7 +25,7 @@ impl Scope {
     pub(crate) const fn instrument(self) -> Option<CaseInstrument> {
         match self {
             Self::Instrument(instrument) => Some(instrument),
-            Self::Whole | Self::Guarded | Self::Large => None,
+            Self::Whole | Self::Guarded | Self::Large | Self::OneLog => None,
         }
     }
 }

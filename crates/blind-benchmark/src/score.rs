@@ -6,7 +6,8 @@ use effects::{Hypothesis, Variant, hypothesis};
 use estimation::Model;
 use kinematics::DriveGeometry;
 
-use super::case::{Case, CaseKind};
+use super::case::Case;
+use super::case_kind::CaseKind;
 use super::hidden::{EffectKind, kind_of};
 use super::oracle::{gain_of_terms, misfit, misfit_of_form};
 use super::planned::planned;
@@ -44,6 +45,7 @@ pub(crate) fn score(number: u64, case: &Case, scope: Scope) -> Result<CaseResult
         counts,
         hidden: case.oracle.clone(),
         reported: Vec::new(),
+        said_of_cut: None,
         failed_checks: Vec::new(),
         refused: None,
         extended: false,
@@ -51,6 +53,10 @@ pub(crate) fn score(number: u64, case: &Case, scope: Scope) -> Result<CaseResult
         other_session: None,
         planned: None,
     };
+    if scope == Scope::OneLog {
+        let said = diagnose(&case.cut(), &Options::default());
+        result.said_of_cut = Some(said.map_or_else(|_| Vec::new(), |diagnosis| reported(&diagnosis.document, case)));
+    }
     match diagnosed {
         Ok(diagnosis) => {
             result.reported = reported(&diagnosis.document, case);

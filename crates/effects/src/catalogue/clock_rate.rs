@@ -2,7 +2,9 @@
 //!
 //! Model: stamp = (1 + ρ) t from the run's start.
 //! Signature: none in a pose by counts, but a time offset that grows: ρ t (v, 0, ω) between what is seen and
-//! what is counted; where speeds are logged instead, a scale.
+//! what is counted; where speeds are logged instead, a scale. Clocks that agree at the start of each run, and
+//! clocks that run on from the session's start, are two variants (`since_session_start` is 1 for the latter):
+//! a log that is cut into runs has the second.
 //! Observability: a robot that moves late in long runs.
 //! Alias: `wheel_scale` where speeds are logged; `truth_latency` over short runs.
 //! Reference: resonators and timers, 0.01 to 3 %, as users report.
@@ -41,7 +43,11 @@ impl PhysicalEffect for ClockRate {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Variant::plain(Term::default()))
+        let of_session =
+            Variant { fixed: vec![("since_session_start", 1.0)], ..Variant::plain(Term { of_session: true, ..Term::default() }).remove(0) };
+        let mut variants = Variant::plain(Term::default());
+        variants.push(of_session);
+        Hypothesis::Terms(variants)
     }
 
     fn description() -> Description {
@@ -77,6 +83,9 @@ impl Forward for State {
 #[derive(Clone, Default)]
 struct Term {
     rate: f64,
+    /// The clocks agreed when the session began, and not at the start of each run.
+    of_session: bool,
+    session_s: f64,
     shift: TimeShift,
 }
 
@@ -90,8 +99,9 @@ impl ModelTerm for Term {
         self.rate = values.first().copied().unwrap_or(0.0);
     }
 
-    fn restart(&mut self, _run: &RunInfo) {
+    fn restart(&mut self, run: &RunInfo) {
         self.shift.restart();
+        self.session_s = if self.of_session { run.start_s.unwrap_or(0.0) } else { 0.0 };
     }
 
     fn motion(&mut self, interval: &Interval<'_>, _gradient: &mut [Pose]) {
@@ -103,11 +113,12 @@ impl ModelTerm for Term {
     /// What the counts say of the instant t by the robot's clock was true ρ t before: the robot is seen
     /// farther on.
     fn measurement(&mut self, measurement: &Measurement<'_>, gradient: &mut [Pose]) {
+        let since_s = self.session_s + measurement.t_s;
         gradient[0] = if self.rate == 0.0 {
             let Twist { v_m_s, omega_rad_s } = measurement.twist;
-            Pose::new(measurement.t_s * v_m_s, 0.0, measurement.t_s * omega_rad_s)
+            Pose::new(since_s * v_m_s, 0.0, since_s * omega_rad_s)
         } else {
-            let seen = self.shift.seen(measurement, -self.rate * measurement.t_s);
+            let seen = self.shift.seen(measurement, -self.rate * since_s);
             Pose::new(seen.x_m / self.rate, seen.y_m / self.rate, seen.theta_rad / self.rate)
         };
     }
@@ -117,6 +128,27 @@ impl ModelTerm for Term {
 mod tests {
     use super::*;
     use kinematics::Wheels;
+
+    #[test]
+    fn clocks_run_on_from_the_start_of_the_run_or_of_the_session() {
+        let run = RunInfo { start_s: Some(100.0), ..RunInfo::default() };
+        let measurement = Measurement {
+            t_s: 2.0,
+            world_from_body: Pose::IDENTITY,
+            twist: Twist { v_m_s: 0.5, omega_rad_s: 0.1 },
+            run: &run,
+        };
+        let seen = |of_session: bool| {
+            let mut term = Term { of_session, ..Term::default() };
+            term.restart(&run);
+            let mut gradient = [Pose::IDENTITY];
+            term.measurement(&measurement, &mut gradient);
+            gradient[0]
+        };
+        // v t and ω t.
+        assert_eq!(seen(false), Pose::new(1.0, 0.0, 0.2));
+        assert_eq!(seen(true), Pose::new(51.0, 0.0, 0.1 * 102.0));
+    }
 
     #[test]
     fn stamps_gain_and_readings_do_not() {
