@@ -78,11 +78,11 @@ fn factor(places: impl Iterator<Item = [f64; 2]>, length_m: f64) -> Option<Facto
         (-0.5 * squared_m2 / (length_m * length_m)).exp()
     };
     let (mut left, mut factor) = (vec![1.0_f64; cells.len()], vec![Vec::new(); cells.len()]);
-    loop {
-        let Some(pivot) = (0..cells.len()).max_by(|a, b| left[*a].total_cmp(&left[*b])) else { break };
-        if left[pivot] <= MAX_MAP_REMAINDER {
-            break;
-        }
+    let largest = |left: &[f64]| {
+        let pivot = (0..left.len()).max_by(|a, b| left[*a].total_cmp(&left[*b]))?;
+        (left[pivot] > MAX_MAP_REMAINDER).then_some(pivot)
+    };
+    while let Some(pivot) = largest(&left) {
         let of_pivot: Vec<f64> = factor[pivot].clone();
         if of_pivot.len() == MAX_MAP_FUNCTIONS {
             return None;

@@ -159,7 +159,8 @@ impl<'a> WheelAngleInterpolator<'a> {
     }
 
     /// Radians that a count of each wheel stands for; 0 where angles are not rounded.
-    pub(crate) const fn quantum_rad(&self) -> Wheels<f64> {
+    #[must_use]
+    pub const fn quantum_rad(&self) -> Wheels<f64> {
         self.rates.quantum_rad
     }
 
