@@ -233,8 +233,8 @@ mod tests {
         assert_eq!(found.turned_rad, wheels(-0.25, 1.5));
         // Speeds of 0.75 and 0.125 m/s grow by half.
         assert_eq!(found.speed_change_m_s, 0.375 + 0.0625);
-        // But it moves the phases and the distance at which the last one starts: 1 + 0.375 − 0.25 rad, 2 + 0.625 +
-        // 0.5 rad, and 16 + 0.375 + 0.125 m.
+        // But it moves the phases and the distance at which the last one starts: 1 + 0.375 − 0.25 rad,
+        // 2 + 0.625 + 0.5 rad, and 16 + 0.375 + 0.125 m.
         assert_eq!((found.phase_rad, found.session_s, found.session_m), (wheels(1.125, 3.125), 8.5, 16.5));
         // Sums start anew, the last interval stays until the next.
         let next = intervals(&[(1.0, wheels(0.5, 0.5))]);

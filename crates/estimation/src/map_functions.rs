@@ -197,8 +197,8 @@ mod tests {
 
     #[test]
     fn a_place_of_which_a_hundredth_is_left_has_no_function_of_its_own() {
-        // Two places d apart: 1 − e^{−d²/ℓ²} is left of the second. A sixteenth of a length leaves 0.0039, two
-        // 0.0155, and a hundredth is the limit.
+        // Two places d apart: 1 − e^{−d²/ℓ²} is left of the second. A sixteenth of a length leaves 0.0039,
+        // two leave 0.0155, and a hundredth is the limit.
         let functions = |cells: f64| {
             let places = [[0.5 / 16.0, 0.5 / 16.0], [(0.5 + cells) / 16.0, 0.5 / 16.0]];
             let functions = map_functions(places.into_iter(), 1.0);
@@ -238,13 +238,19 @@ mod tests {
             assert!(((quarter - start) - 0.25 * TAU).abs() < 1e-12);
             squares = [0, 1].map(|k| squares[k] + per_m[k] * per_m[k] / n);
             mixed += per_m[0] * per_m[1] / n;
-            lengths.push(per_m[0].hypot(per_m[1]) * length_m);
+            // Each turns on from the one before by π (3 − √5), whatever the length.
+            let direction_rad = lengths.len() as f64 * std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+            let length_per_m = per_m[0].hypot(per_m[1]);
+            // Angles of up to 150 rad, rounded.
+            assert!((per_m[0] - length_per_m * direction_rad.cos()).abs() < 1e-11 * length_per_m);
+            assert!((per_m[1] - length_per_m * direction_rad.sin()).abs() < 1e-11 * length_per_m);
+            lengths.push(length_per_m * length_m);
         }
-        // The curvature of the covariance at 0 is E w wᵀ = 1/ℓ²; 64 quantiles leave 2 % of the tail, and directions
-        // some per cent.
+        // The curvature of the covariance at 0 is E w wᵀ = 1/ℓ²; 64 quantiles leave 2 % of the tail, and
+        // directions some per cent.
         assert!(squares.iter().all(|of| (of * length_m * length_m - 1.0).abs() < 0.1), "{squares:?}");
         assert!((mixed * length_m * length_m).abs() < 0.1, "{mixed}");
-        // Rayleigh: half of the lengths are below √(2 ln 2), a quarter below √(2 ln 4/3), to half of a quantile.
+        // Rayleigh: half of the lengths are below √(2 ln 2), a quarter below √(2 ln 4/3).
         for (share, quantile) in [(0.5, 2.0_f64.ln()), (0.25, (4.0_f64 / 3.0).ln())] {
             let below = lengths.iter().filter(|length| **length < (2.0 * quantile).sqrt()).count();
             assert_eq!(below as f64, share * n, "{share}");

@@ -268,7 +268,7 @@ mod tests {
             let on_paper = if row == column { variance[row] } else { 0.0 };
             // Elements of up to 30.
             assert!((covariance - on_paper).abs() < 1e-11, "{row} {column}: {covariance} {on_paper}");
-            // L is unit lower triangular in the robot's frame: a component has itself once and none behind it.
+            // L is unit lower triangular in the robot's frame: a component has itself once, and none behind.
             let share = found[row].dot(&axes[column]);
             assert!(row > column || (share - f64::from(u8::from(row == column))).abs() < ROUNDING, "{row} {column}");
         }

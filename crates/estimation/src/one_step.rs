@@ -294,7 +294,7 @@ impl ModelFit<'_> {
 #[cfg(test)]
 mod tests {
     use dataset::{Existing, write};
-    use kinematics::Pose;
+    use kinematics::{Pose, Wheels};
 
     use super::*;
     use crate::GroupExtrinsics;
@@ -325,6 +325,27 @@ mod tests {
             // Files have all digits; sums are taken in one order.
             assert!((&part.gradient - &whole.gradient).amax() < 1e-9 * whole.gradient.amax(), "{part:?} {whole:?}");
         }
+    }
+
+    #[test]
+    fn a_run_with_an_instrument_of_its_own_is_one_part_however_many_blocks_it_has() {
+        // A block of 1024 rows, and one of the others.
+        let mut dataset = dataset_of(1, true);
+        let run = &mut dataset.runs[0];
+        let turned = |row: u32| f64::from(row) + 0.3 * (0.11 * f64::from(row)).sin();
+        let angles = |by: f64| (0..2100).map(|row| by * turned(row)).collect::<Vec<f64>>();
+        run.odometry.t_s = (0..2100).map(|row| 0.1 * f64::from(row)).collect();
+        run.odometry.wheels = dataset::WheelLog::Angles(Wheels { left: angles(0.1), right: angles(0.11) });
+        let sample = |row: u32| dataset::TruthSample::new(0.1 * f64::from(row), 0.0, 0.0, Some(0.0));
+        run.truth = (0..2100).step_by(50).map(sample).collect();
+        let own = GroupExtrinsics::new(Grouping::Run, vec![Column::SensorX]);
+        let by_session = GroupExtrinsics::new(Grouping::Session, vec![Column::SensorX]);
+        let parts = |own: Option<GroupExtrinsics>| {
+            let mut fit = ModelFit::from_parameters(Model { own, ..MODEL }, NOISE, &[dataset.session()]);
+            fit.ungated = true;
+            gathered("blocks", &dataset, &mut fit, 1).parts.len()
+        };
+        assert_eq!([parts(None), parts(Some(by_session)), parts(Some(own))], [2, 2, 1]);
     }
 
     #[test]

@@ -229,8 +229,8 @@ mod tests {
             let n = distinct.len() as f64;
             let squares: f64 = distinct.iter().map(|bits| f64::from_bits(*bits).powi(2)).sum();
             let mean = distinct.iter().map(|bits| f64::from_bits(*bits)).sum::<f64>() / n;
-            // Uniform: q²/12, of which the mean square of n draws has the standard error √(4/5n), 9 %, and the
-            // mean q/√(12 n): four of them. Rejects draws about half a count.
+            // Uniform: q²/12, of which the mean square of n draws has the standard error √(4/5n), 9 %, and
+            // the mean q/√(12 n): four of them. Rejects draws about half a count.
             assert!((squares / n / (quantum_rad * quantum_rad / 12.0) - 1.0).abs() < 0.36, "{}", squares / n);
             assert!(mean.abs() < 4.0 * quantum_rad / (12.0 * n).sqrt(), "{mean}");
         }

@@ -113,6 +113,10 @@ fn a_damped_noise_step_is_shorter_where_it_turns_back_and_longer_where_it_goes_o
     let again = damping.damped(Vector4::new(-1.0, -2.0, 3.0, 5.0));
     let grown = (STEP_INCREASE * STEP_DECREASE).min(1.0);
     assert_eq!(again, Vector4::new(-grown, -2.0 * STEP_DECREASE, 3.0 * grown, 5.0));
+    // Back once more: it shrinks each time.
+    let [twice, grown_twice] = [STEP_DECREASE * STEP_DECREASE, (STEP_INCREASE * grown).min(1.0)];
+    let back = damping.damped(Vector4::new(-1.0, 2.0, 3.0, 5.0));
+    assert_eq!(back, Vector4::new(-grown_twice, 2.0 * twice, 3.0 * grown_twice, 5.0));
 }
 
 #[test]

@@ -84,8 +84,8 @@ fn standing(pairs: usize, off: f64) -> Vec<(f64, [f64; 2], f64)> {
 
 #[test]
 fn noise_of_standstills_is_half_of_the_mean_square_change_of_the_rate() {
-    // From row to row the rate changes by 2a, of which the angle random walk n has the variance n² (1/T + 1/T):
-    // n = a √(2 T).
+    // From row to row the rate changes by 2a, of which the angle random walk n has the variance
+    // n² (1/T + 1/T): n = a √(2 T).
     let of = |runs: Vec<Run>| {
         let dataset = dataset(runs);
         GyroSettings::of(&dataset.session()).noise_rad_per_sqrt_s
@@ -117,11 +117,14 @@ fn noise_of_standstills_is_half_of_the_mean_square_change_of_the_rate() {
 
 #[test]
 fn noise_of_a_robot_that_hardly_stands_is_how_it_strays_from_the_wheels() {
-    // Ten windows of a second in ten rows each. The wheels turn by (0.5 + 0.5) · 0.08/0.363 rad in a row, the
-    // gyroscope says so with a bias, off by 0.02 rad/s in turn from window to window.
-    let rate = 10.0 * 0.08 / 0.363;
-    let rows: Vec<_> =
-        (0..100).map(|row| (0.1, TURNING, rate + 0.3 + if row / 10 % 2 == 0 { 0.02 } else { -0.02 })).collect();
+    // Ten windows of a second in ten rows each, in turn at two rates of the wheels. The gyroscope says what they
+    // do with a bias, off by 0.02 rad/s in turn from window to window.
+    let rows: Vec<_> = (0..100)
+        .map(|row| {
+            let (half_rad, off) = if row / 10 % 2 == 0 { (0.5, 0.02) } else { (0.25, -0.02) };
+            (0.1, [-half_rad, half_rad], 20.0 * half_rad * 0.08 / 0.363 + 0.3 + off)
+        })
+        .collect();
     // 49 pairs of rows that stand are too few to be asked.
     let mut all = standing(49, 0.5);
     all.truncate(50);
@@ -129,7 +132,7 @@ fn noise_of_a_robot_that_hardly_stands_is_how_it_strays_from_the_wheels() {
     let found = GyroSettings::of(&moving.session()).noise_rad_per_sqrt_s.expect("it moves");
     // Every pair of windows of a second has the square 0.04²/2, of χ² with its median.
     let on_paper = 0.04 / (2.0 * CHI_SQUARE_1_MEDIAN).sqrt();
-    // Stamps are sums of tenths: windows are a second to 1e-14. Rejects rates that are not held against wheels.
+    // Windows of sums of tenths are a second to 1e-14. Rejects rates that are not held against wheels.
     assert!((found / on_paper - 1.0).abs() < 1e-9, "{found} {on_paper}");
     let mut both = rows.clone();
     both.splice(0..0, all);

@@ -17,6 +17,7 @@ mod golden_numbers;
 mod groups;
 mod intervals;
 mod map;
+mod nuisances;
 mod one_step;
 mod partial;
 mod partial_poses;

@@ -44,6 +44,9 @@ fn runs_that_say_nothing_are_unused() {
     assert_eq!(records.unused, [(0, 1), (0, 2), (1, 1), (1, 2)]);
     assert_eq!(records.ids, [["run-0", "run-1", "run-2", "run-3"]; 2]);
     assert_eq!((records.measurements(), records.segments.len()), (2 * (7 + 2), 4));
+    // Every two seconds; the second segment has two.
+    let at = [(0, 3), (1, 1), (1, 2), (4, 0)].map(|(segment, at)| records.measurement_s(segment, at));
+    assert_eq!(at, [Some(6.0), Some(2.0), None, None]);
     // A gyroscope is a measurement; poses beside it are counted once.
     let with_gyro = partial::dataset(partial::GYRO, |_, _| {});
     let records = Records::of(&[with_gyro.session()]);
@@ -138,6 +141,14 @@ fn a_sensors_heading_is_that_between_measured_and_dead_reckoned_motions() {
         let found = Records::of(&[dataset.session()]).sensor_heading_rad(&model);
         assert!((found - sensor_rad).abs() < 1e-12, "{found} {sensor_rad}");
     }
+    // Backwards, and across: a product that is 0 is a direction too.
+    for (end, on_paper) in [([-1.0, 0.0], std::f64::consts::PI), ([0.0, 1.0], 0.5 * std::f64::consts::PI)] {
+        let mut dataset = log(0.0, true);
+        dataset.runs[0].truth.truncate(2);
+        dataset.runs[0].truth[1] = TruthSample::new(1.0, end[0], end[1], Some(0.0));
+        let found = Records::of(&[dataset.session()]).sensor_heading_rad(&model);
+        assert!((found.abs() - on_paper).abs() < 1e-12, "{found} {on_paper}");
+    }
     let without = log(0.3, false);
     assert_eq!(Records::of(&[without.session()]).sensor_heading_rad(&model), 0.0);
     // The farthest from the first pose is √5 m away.
@@ -154,6 +165,51 @@ fn a_sensors_heading_is_that_between_measured_and_dead_reckoned_motions() {
     }
     let extent_m = Records::of(&[two.session()]).extent_m();
     assert!((extent_m - 3.0_f64.sqrt()).abs() < 1e-12, "{extent_m}");
+}
+
+/// A straight of 1 m that is measured where it leads, and an arc that is measured to lead 0.5 rad to the right of
+/// where it does.
+#[test]
+fn arcs_count_for_a_sensors_heading_by_their_chords_and_loops_do_not() {
+    let model = Model { m_per_rad: Wheels::both(0.1), separation_m: 0.4, ..CENTRED_MODEL };
+    let found = |turn_rad: f64, length_m: f64| {
+        let mut dataset = dataset_of(1, true);
+        let run = &mut dataset.runs[0];
+        run.odometry.t_s = vec![0.0, 1.0, 2.0];
+        let (left, right) = (length_m - 0.2 * turn_rad, length_m + 0.2 * turn_rad);
+        let angles = Wheels { left: vec![0.0, 10.0, 10.0 + 10.0 * left], right: vec![0.0, 10.0, 10.0 + 10.0 * right] };
+        run.odometry.wheels = WheelLog::Angles(angles);
+        let chord_m = length_m * (0.5 * turn_rad).sin() / (0.5 * turn_rad);
+        let (sin, cos) = (0.5 * turn_rad - 0.5).sin_cos();
+        run.truth = vec![
+            TruthSample::new(0.0, 0.0, 0.0, Some(0.0)),
+            TruthSample::new(1.0, 1.0, 0.0, Some(0.0)),
+            TruthSample::new(2.0, 1.0 + chord_m * cos, chord_m * sin, Some(turn_rad)),
+        ];
+        (Records::of(&[dataset.session()]).sensor_heading_rad(&model), chord_m)
+    };
+    // Of 4 rad the chord is 0.45 of the arc, of 5 rad 0.24: 0.3 is the least. Chords count by their squares.
+    let (heading_rad, chord_m) = found(4.0, 2.0);
+    let weight = chord_m * chord_m;
+    let on_paper = (weight * 0.5_f64.sin()).atan2(1.0 + weight * 0.5_f64.cos());
+    assert!((heading_rad - on_paper).abs() < 1e-12, "{heading_rad} {on_paper}");
+    assert!(found(5.0, 2.0).0.abs() < 1e-12, "{}", found(5.0, 2.0).0);
+}
+
+#[test]
+fn displacements_begin_at_the_angles_of_their_wheels() {
+    let mut dataset = selection::displacement_dataset(&[4], 0.0, 1);
+    let WheelLog::Angles(angles) = &mut dataset.runs[0].odometry.wheels else { unreachable!("the helper logs angles") };
+    angles.left.iter_mut().for_each(|rad| *rad += 5.0);
+    angles.right.iter_mut().for_each(|rad| *rad -= 3.0);
+    let records = Records::of(&[dataset.session()]);
+    let turned = |of: &[f64], segment: usize| of[..segment].iter().sum::<f64>();
+    for (number, segment) in records.segments.iter().enumerate() {
+        let on_paper = Wheels { left: 5.0 + turned(&LEFT_RAD, number), right: -3.0 + turned(&RIGHT_RAD, number) };
+        assert_eq!(segment.wheel_rad, on_paper, "{number}");
+        assert_eq!((segment.intervals.len(), segment.measurements[0].after), (1, 1));
+        assert_eq!(segment.intervals[0].wheel_rad, Wheels { left: LEFT_RAD[number], right: RIGHT_RAD[number] });
+    }
 }
 
 #[test]

@@ -206,9 +206,18 @@ fn a_rates_noise_counts_against_what_is_left_of_its_variance() {
     // Of independent wheels the centre has the variance ½ · 0.01 and, of noise n, ½ · 0.01 n: a tenth of
     // what is left of it is n = 1/11. The turn has the same ratio.
     assert!(is_below(&both, 0.99 / 11.0) && !is_below(&both, 1.01 / 11.0));
-    // The mean is no signal. Rejects a mean square.
-    let offset = both.clone().map(|rates| rates.into_iter().map(|rate| rate + 3.0).collect());
-    assert!(is_below(&offset, 0.99 / 11.0) && !is_below(&offset, 1.01 / 11.0));
+    // The mean is no signal. Twice as much turn, or twice as much speed, leaves the limit to the other alone: its
+    // rates are 1 rad/s of each wheel, with the variance 0.01, and n is 2/11. Rejects a mean square of either.
+    let of = |speeds: f64, turns: f64, mean: [f64; 2]| {
+        let wheel = |mean: f64, side: f64| {
+            let [slow, fast] = [[1.0, 1.0, -1.0, -1.0], [1.0, -1.0, 1.0, -1.0]];
+            (0..4).map(|row| mean + speeds * slow[row] + side * turns * fast[row]).collect::<Vec<f64>>()
+        };
+        [wheel(mean[0], -1.0), wheel(mean[1], 1.0)]
+    };
+    for rates in [of(1.0, 2.0, [3.0, 3.0]), of(2.0, 1.0, [-3.0, 3.0])] {
+        assert!(is_below(&rates, 0.99 * 2.0 / 11.0) && !is_below(&rates, 1.01 * 2.0 / 11.0), "{rates:?}");
+    }
 }
 
 #[test]
@@ -233,7 +242,8 @@ fn jitter_is_the_standard_deviation_of_stamps() {
         let t_s: Vec<f64> = (0..101).map(|row| row_s * f64::from(row) + error_s * f64::from(row % 2)).collect();
         (are_inexact(&t_s), stamp_jitter_s(&t_s))
     };
-    // The median row is itself longer by up to 5 %. Two per cent of a row of 0.1 s, the rounding of a file of milliseconds, a twentieth of a row of 2 ms.
+    // Two per cent of a row of 0.1 s, the rounding of a file of milliseconds, a twentieth of a row of 2 ms;
+    // the median row is itself longer by up to 5 %.
     for (row_s, limit_s) in [(0.1, 2e-3), (0.02, 5e-4), (2e-3, 1e-4)] {
         let error_s = limit_s / (with(row_s, 1e-3 * row_s).1 / (1e-3 * row_s));
         assert!(!with(row_s, 0.9 * error_s).0 && with(row_s, 1.1 * error_s).0, "{row_s}");
