@@ -117,8 +117,8 @@ fn noise_of_standstills_is_half_of_the_mean_square_change_of_the_rate() {
 
 #[test]
 fn noise_of_a_robot_that_hardly_stands_is_how_it_strays_from_the_wheels() {
-    // Ten windows of a second in ten rows each, in turn at two rates of the wheels. The gyroscope says what they
-    // do with a bias, off by 0.02 rad/s in turn from window to window.
+    // Ten windows of a second in ten rows each, in turn at two rates of the wheels. The gyroscope says what
+    // they do with a bias, off by 0.02 rad/s in turn from window to window.
     let rows: Vec<_> = (0..100)
         .map(|row| {
             let (half_rad, off) = if row / 10 % 2 == 0 { (0.5, 0.02) } else { (0.25, -0.02) };

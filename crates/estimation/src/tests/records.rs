@@ -167,8 +167,8 @@ fn a_sensors_heading_is_that_between_measured_and_dead_reckoned_motions() {
     assert!((extent_m - 3.0_f64.sqrt()).abs() < 1e-12, "{extent_m}");
 }
 
-/// A straight of 1 m that is measured where it leads, and an arc that is measured to lead 0.5 rad to the right of
-/// where it does.
+/// A straight of 1 m that is measured where it leads, and an arc that is measured to lead 0.5 rad to the
+/// right of where it does.
 #[test]
 fn arcs_count_for_a_sensors_heading_by_their_chords_and_loops_do_not() {
     let model = Model { m_per_rad: Wheels::both(0.1), separation_m: 0.4, ..CENTRED_MODEL };

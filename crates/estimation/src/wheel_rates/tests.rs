@@ -206,8 +206,9 @@ fn a_rates_noise_counts_against_what_is_left_of_its_variance() {
     // Of independent wheels the centre has the variance ½ · 0.01 and, of noise n, ½ · 0.01 n: a tenth of
     // what is left of it is n = 1/11. The turn has the same ratio.
     assert!(is_below(&both, 0.99 / 11.0) && !is_below(&both, 1.01 / 11.0));
-    // The mean is no signal. Twice as much turn, or twice as much speed, leaves the limit to the other alone: its
-    // rates are 1 rad/s of each wheel, with the variance 0.01, and n is 2/11. Rejects a mean square of either.
+    // The mean is no signal. Twice as much turn, or twice as much speed, leaves the limit to the other alone:
+    // its rates are 1 rad/s of each wheel, with the variance 0.01, and n is 2/11. Rejects a mean square of
+    // either.
     let of = |speeds: f64, turns: f64, mean: [f64; 2]| {
         let wheel = |mean: f64, side: f64| {
             let [slow, fast] = [[1.0, 1.0, -1.0, -1.0], [1.0, -1.0, 1.0, -1.0]];
