@@ -191,4 +191,84 @@ mod tests {
         // From −0.1 m/s at its start to −0.2 m/s at its end.
         assert_eq!(second.speed_change_m_s, -0.1);
     }
+
+    /// Intervals of so many seconds in which each wheel turns by so much, one after the other, at 1 m/rad.
+    fn intervals(turns: &[(f64, Wheels<f64>)]) -> Vec<WheelInterval> {
+        let mut t_s = 0.0;
+        let of = |(dt_s, wheel_rad): &(f64, Wheels<f64>)| {
+            let from_s = t_s;
+            t_s += dt_s;
+            let rate_rad_s = wheel_rad.map(|rad| if *dt_s > 0.0 { rad / dt_s } else { 0.0 });
+            WheelInterval {
+                wheel_rad: *wheel_rad,
+                t_s: from_s,
+                dt_s: *dt_s,
+                rate_rad_s,
+                rate_at_ends_rad_s: [rate_rad_s, rate_rad_s.map(|rate| 1.5 * rate)],
+                late_s: [0.0; 2],
+                chord_area_rad2: 0.0,
+                stands: false,
+                starts_within_row: false,
+                interpolated_rad2: [Wheels::both(0.0); 2],
+            }
+        };
+        turns.iter().map(of).collect()
+    }
+
+    fn model() -> Model {
+        Model::of(&DriveGeometry::new(Wheels::both(2.0), 0.5).expect("a drive"), 0)
+    }
+
+    #[test]
+    fn an_arc_is_summed_with_its_turn_its_speeds_and_its_phases() {
+        // Powers of two, which sums do not round: an arc, an interval without length, and another arc.
+        let wheels = |left, right| Wheels { left, right };
+        let arcs = intervals(&[(0.5, wheels(0.25, 0.5)), (0.0, wheels(0.125, 0.125)), (2.0, wheels(-0.5, 1.0))]);
+        let mut sampler = KinematicSampler::new();
+        sampler.add(8.0, &arcs, &model(), (wheels(1.0, 2.0), 16.0));
+        let found = sampler.sample((3, 4), Pose::IDENTITY).expect("time went by");
+        assert_eq!((found.segment, found.measurement, found.duration_s), (3, 4, 2.5));
+        // The interval without length is no part of the motion: (0.375 + 0.25) m, (0.25 + 1.5)/0.5 rad.
+        assert_eq!((found.motion.distance_m, found.motion.turn_rad), (0.625, 3.5));
+        assert_eq!(found.turned_rad, wheels(-0.25, 1.5));
+        // Speeds of 0.75 and 0.125 m/s grow by half.
+        assert_eq!(found.speed_change_m_s, 0.375 + 0.0625);
+        // But it moves the phases and the distance at which the last one starts: 1 + 0.375 − 0.25 rad,
+        // 2 + 0.625 + 0.5 rad, and 16 + 0.375 + 0.125 m.
+        assert_eq!((found.phase_rad, found.session_s, found.session_m), (wheels(1.125, 3.125), 8.5, 16.5));
+        // Sums start anew, the last interval stays until the next.
+        let next = intervals(&[(1.0, wheels(0.5, 0.5))]);
+        sampler.add(8.0, &next, &model(), (wheels(2.0, 2.0), 20.0));
+        let found = sampler.sample((3, 5), Pose::IDENTITY).expect("time went by");
+        assert_eq!((found.motion.distance_m, found.motion.turn_rad, found.duration_s), (0.5, 0.0, 1.0));
+        assert_eq!((found.turned_rad, found.speed_change_m_s), (wheels(0.5, 0.5), 0.25));
+        assert_eq!((found.phase_rad, found.session_m), (wheels(2.25, 2.25), 20.0));
+    }
+
+    #[test]
+    fn reversals_are_a_millimetre_back_and_less_is_none() {
+        let mut sampler = KinematicSampler::new();
+        let mut since = |distances_m: &[f64]| {
+            let turns: Vec<(f64, Wheels<f64>)> = distances_m.iter().map(|m| (1.0, Wheels::both(*m))).collect();
+            sampler.add(0.0, &intervals(&turns), &model(), (Wheels::both(0.0), 0.0));
+            sampler.sample((0, 0), Pose::IDENTITY).expect("time went by").since_reversal_m
+        };
+        // The first motion is no reversal in either direction, and less than half a millimetre has none.
+        assert_eq!(since(&[-0.4e-3, 0.8e-3]), None);
+        // Ahead, 0.9 mm back and ahead again. Rejects a reversal at each change of sign.
+        assert_eq!(since(&[10e-3, -0.9e-3, 5e-3]), None);
+        // Back by 1.1 mm in two parts: it is known in the second, and counts from its start.
+        let found = since(&[-0.6e-3, -0.5e-3]).expect("a reversal");
+        // Roundings of three sums; the same below.
+        assert!((found - 0.5e-3).abs() < 1e-12, "{found}");
+        // Ahead by 0.9 mm and on: distance adds up, whichever its direction.
+        let found = since(&[0.9e-3, -3e-3]).expect("the same reversal");
+        assert!((found - 4.4e-3).abs() < 1e-12, "{found}");
+        // From the back the same, and it counts anew.
+        let found = since(&[1.1e-3, 2e-3]).expect("a second reversal");
+        assert!((found - 3.1e-3).abs() < 1e-12, "{found}");
+        // Back and forth within a millimetre leaves the direction as it was: the next motion ahead is none.
+        let found = since(&[-0.9e-3, 0.9e-3, 4e-3]).expect("the same reversal");
+        assert!((found - 8.9e-3).abs() < 1e-12, "{found}");
+    }
 }

@@ -166,4 +166,94 @@ mod tests {
         // 1/64 of each. Rejected: the spectrum of e^{−d²/ℓ²}, off by 0.24, and waves along x alone.
         assert!(worst < 0.05, "{worst}");
     }
+
+    #[test]
+    fn two_places_have_the_covariance_of_their_distance() {
+        // Cells are sixteenths of a length: distances of whole cells are exact. A place in every direction.
+        let length_m = 0.5;
+        for [x, y] in [[16.0, 0.0], [0.0, 16.0], [-8.0, 24.0], [-3.0, -4.0], [32.0, 32.0]] {
+            // In the middle of a cell, far from the origin.
+            let a = [7.0 + 0.5 / 32.0, -3.0 + 0.5 / 32.0];
+            let b = [a[0] + x / 32.0, a[1] + y / 32.0];
+            let functions = map_functions([a, b].into_iter(), length_m);
+            assert_eq!(functions.len(), 2, "{x} {y}");
+            let on_paper = stated(a, b, length_m);
+            // The rounding of a dozen products.
+            assert!((covariance(&functions, a, b) - on_paper).abs() < 1e-12, "{x} {y}");
+            assert!((covariance(&functions, a, a) - 1.0).abs() < 1e-12);
+            assert!((covariance(&functions, b, b) - 1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn places_in_one_cell_are_one_and_others_have_no_value() {
+        let functions = map_functions([[0.01, 0.01], [0.02, 0.03], [0.02, 0.01]].into_iter(), 0.8);
+        assert_eq!(functions.len(), 1);
+        assert_eq!((functions[0].at([0.04, 0.049]), functions[0].at([0.06, 0.0])), (1.0, 0.0));
+        // Cells do not meet about the origin. Rejects a rounding towards it.
+        assert_eq!(functions[0].at([-0.01, 0.01]), 0.0);
+        assert_eq!(map_functions(std::iter::empty(), 0.8).len(), 0);
+    }
+
+    #[test]
+    fn a_place_of_which_a_hundredth_is_left_has_no_function_of_its_own() {
+        // Two places d apart: 1 − e^{−d²/ℓ²} is left of the second. A sixteenth of a length leaves 0.0039,
+        // two leave 0.0155, and a hundredth is the limit.
+        let functions = |cells: f64| {
+            let places = [[0.5 / 16.0, 0.5 / 16.0], [(0.5 + cells) / 16.0, 0.5 / 16.0]];
+            let functions = map_functions(places.into_iter(), 1.0);
+            (
+                functions.len(),
+                covariance(&functions, places[0], places[1]),
+                covariance(&functions, places[1], places[1]),
+            )
+        };
+        // With one function both are the same place, with all of its variance.
+        assert_eq!(functions(1.0), (1, 1.0, 1.0));
+        let (two, of_both, _) = functions(2.0);
+        assert!(two == 2 && (of_both - f64::exp(-0.5 / 64.0)).abs() < 1e-12, "{two} {of_both}");
+    }
+
+    #[test]
+    fn a_wave_is_a_cosine_along_its_direction() {
+        let wave = MapFunction::Wave { per_m: [2.0, -3.0], phase_rad: 0.4, amplitude: 5.0 };
+        // 2 · 0.3 − 3 · 0.7 + 0.4. Products of a few numbers, each rounded.
+        assert!((wave.at([0.3, 0.7]) - 5.0 * (-1.1_f64).cos()).abs() < 1e-12, "{}", wave.at([0.3, 0.7]));
+    }
+
+    #[test]
+    fn waves_have_the_spectrum_of_the_process_and_spread_over_directions() {
+        let length_m = 0.5;
+        let all = waves(length_m);
+        let of = |function: &MapFunction| match function {
+            MapFunction::Wave { per_m, phase_rad, amplitude } => (*per_m, *phase_rad, *amplitude),
+            MapFunction::OfPlaces { .. } => panic!("no wave"),
+        };
+        let n = f64::from(MAP_WAVES);
+        let (mut squares, mut mixed, mut lengths) = ([0.0; 2], 0.0, Vec::new());
+        for pair in all.chunks(2) {
+            let [(per_m, start, amplitude), (other, quarter, of_other)] = [of(&pair[0]), of(&pair[1])];
+            // A sine and a cosine of one wave, so that every place has the same variance.
+            assert!(per_m == other && amplitude == of_other && (amplitude * amplitude * n - 1.0).abs() < 1e-12);
+            assert!(((quarter - start) - 0.25 * TAU).abs() < 1e-12);
+            squares = [0, 1].map(|k| squares[k] + per_m[k] * per_m[k] / n);
+            mixed += per_m[0] * per_m[1] / n;
+            // Each turns on from the one before by π (3 − √5), whatever the length.
+            let direction_rad = lengths.len() as f64 * std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+            let length_per_m = per_m[0].hypot(per_m[1]);
+            // Angles of up to 150 rad, rounded.
+            assert!((per_m[0] - length_per_m * direction_rad.cos()).abs() < 1e-11 * length_per_m);
+            assert!((per_m[1] - length_per_m * direction_rad.sin()).abs() < 1e-11 * length_per_m);
+            lengths.push(length_per_m * length_m);
+        }
+        // The curvature of the covariance at 0 is E w wᵀ = 1/ℓ²; 64 quantiles leave 2 % of the tail, and
+        // directions some per cent.
+        assert!(squares.iter().all(|of| (of * length_m * length_m - 1.0).abs() < 0.1), "{squares:?}");
+        assert!((mixed * length_m * length_m).abs() < 0.1, "{mixed}");
+        // Rayleigh: half of the lengths are below √(2 ln 2), a quarter below √(2 ln 4/3).
+        for (share, quantile) in [(0.5, 2.0_f64.ln()), (0.25, (4.0_f64 / 3.0).ln())] {
+            let below = lengths.iter().filter(|length| **length < (2.0 * quantile).sqrt()).count();
+            assert_eq!(below as f64, share * n, "{share}");
+        }
+    }
 }

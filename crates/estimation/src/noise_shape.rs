@@ -134,3 +134,145 @@ impl CorrelatedErrors {
         Whitened { variance: [d_along, d_across, of(&heading, &heading)], axes: [along, across, heading] }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Position and heading correlate, in no direction of the room alone.
+    const SHAPE: NoiseShape = NoiseShape { elements: [6.0, 1.5, 0.5, 2.0, -0.25, 3.0] };
+
+    /// Roundings of matrices of elements of about one.
+    const ROUNDING: f64 = 1e-12;
+
+    fn close(a: f64, b: f64) -> bool {
+        (a - b).abs() < ROUNDING
+    }
+
+    #[test]
+    fn a_stated_covariance_is_taken_over_its_reference() {
+        let stated = PoseCovariance::stated([8e-4, 2e-4, 3e-4, 4e-4, -1e-4, 9e-4]).expect("possible").expect("stated");
+        let found = NoiseShape::of(&stated, [0.02, 0.03], [7.0, 11.0]).elements;
+        // Over 4e-4 m², 6e-4 m rad and 9e-4 rad².
+        let on_paper = [2.0, 0.5, 0.5, 1.0, -1.0 / 6.0, 1.0];
+        assert!(found.iter().zip(on_paper).all(|(found, on_paper)| close(*found, on_paper)), "{found:?}");
+        // What is not stated has its factors.
+        let heading = PoseCovariance::stated([0.0, 0.0, 0.0, 0.0, 0.0, 9e-4]).expect("possible").expect("stated");
+        assert_eq!(NoiseShape::of(&heading, [0.02, 0.03], [7.0, 11.0]).as_factors(), Some([7.0, 1.0]));
+        let position = PoseCovariance::stated([8e-4, 0.0, 0.0, 4e-4, 0.0, 0.0]).expect("possible").expect("stated");
+        let found = NoiseShape::of(&position, [0.02, 0.03], [7.0, 11.0]).elements;
+        assert!(close(found[0], 2.0) && close(found[3], 1.0) && found[5] == 11.0, "{found:?}");
+    }
+
+    #[test]
+    fn factors_tell_all_of_a_circle_without_correlations() {
+        let of = |elements: [f64; 6]| NoiseShape { elements }.as_factors();
+        assert_eq!(of([4.0, 0.0, 0.0, 4.0, 0.0, 9.0]), Some([4.0, 9.0]));
+        for ellipse in [
+            [4.0, 0.0, 0.0, 5.0, 0.0, 9.0],
+            [4.0, 0.1, 0.0, 4.0, 0.0, 9.0],
+            [4.0, 0.0, 0.1, 4.0, 0.0, 9.0],
+            [4.0, 0.0, 0.0, 4.0, 0.1, 9.0],
+        ] {
+            assert_eq!(of(ellipse), None, "{ellipse:?}");
+        }
+    }
+
+    #[test]
+    fn least_factors_are_the_short_axis_and_the_heading_given_the_position() {
+        assert_eq!(NoiseShape::independent([4.0, 9.0]).least_factors(), [4.0, 9.0]);
+        // Of 6, 2 and 1.5 the eigenvalues are 6.5 and 1.5: 4 ± √(2² + 1.5²).
+        let [position, heading] = SHAPE.least_factors();
+        assert!(close(position, 1.5), "{position}");
+        // 3 less bᵀ P⁻¹ b, with b = (0.5, −0.25) and P⁻¹ = ((2, −1.5), (−1.5, 6))/9.75.
+        let given = (0.5 * 0.5 * 2.0 + 2.0 * 0.5 * 0.25 * 1.5 + 0.25 * 0.25 * 6.0) / 9.75;
+        assert!(close(heading, 3.0 - given), "{heading} {given}");
+        // The other axis is short. Rejects the variance along x or y.
+        let [position, _] = NoiseShape { elements: [2.0, -1.5, 0.0, 6.0, 0.0, 1.0] }.least_factors();
+        assert!(close(position, 1.5), "{position}");
+        // Positions that are known in one direction: no inverse, and the heading's own variance.
+        let line = NoiseShape { elements: [1.0, 1.0, 0.0, 1.0, 0.0, 5.0] }.least_factors();
+        assert_eq!(line, [0.0, 5.0]);
+    }
+
+    #[test]
+    fn a_covariance_has_the_units_of_its_coordinates() {
+        let r = SHAPE.covariance([4.0, 9.0]);
+        let on_paper = Matrix3::new(24.0, 6.0, 3.0, 6.0, 8.0, -1.5, 3.0, -1.5, 27.0);
+        assert!((r - on_paper).amax() < ROUNDING, "{r}");
+    }
+
+    #[test]
+    fn derivatives_are_those_of_the_covariance() {
+        let variance = [4.0_f64, 9.0];
+        let analytic = SHAPE.covariance_by(variance);
+        for k in 0..2 {
+            let at = |by: f64| {
+                let mut moved = variance;
+                moved[k] *= by.exp();
+                SHAPE.covariance(moved)
+            };
+            let numeric = (at(1e-4) - at(-1e-4)) / 2e-4;
+            // Central differences leave h²/6 of the third derivative, 27, and rounding of 1e-12.
+            assert!((numeric - analytic[k]).amax() < 1e-6, "{k}: {numeric} {}", analytic[k]);
+        }
+    }
+
+    #[test]
+    fn a_start_has_its_errors_moved_by_the_lever() {
+        let (variance, lever) = ([4.0, 9.0], Vector3::new(0.5, -2.0, 1.0));
+        let [covariance, by_position, by_heading] = SHAPE.at_start(variance, lever);
+        // An error (x, y, θ) moves the pose by (x + θ/2, y − 2 θ, θ).
+        let moved = Matrix3::new(1.0, 0.0, 0.5, 0.0, 1.0, -2.0, 0.0, 0.0, 1.0);
+        let of = |noise: Matrix3<f64>| moved * noise * moved.transpose();
+        let [position, heading] = SHAPE.covariance_by(variance);
+        assert!((covariance - of(SHAPE.covariance(variance))).amax() < ROUNDING, "{covariance}");
+        assert!((by_position - of(position)).amax() < ROUNDING && (by_heading - of(heading)).amax() < ROUNDING);
+    }
+
+    #[test]
+    fn errors_have_the_covariance() {
+        // Of unit draws along each axis: the sum of e eᵀ is L Lᵀ.
+        let draws = [Vector3::x(), Vector3::y(), Vector3::z()];
+        let sum = draws.into_iter().fold(Matrix3::zeros(), |sum, draw| {
+            let errors = SHAPE.errors([4.0, 9.0], draw);
+            sum + errors * errors.transpose()
+        });
+        assert!((sum - SHAPE.covariance([4.0, 9.0])).amax() < ROUNDING, "{sum}");
+    }
+
+    #[test]
+    fn errors_of_instants_go_along_the_path() {
+        assert_eq!(CorrelatedErrors::of(None, [1.0, 1.0], Vector3::zeros()), None);
+        // A second at 1 m/s in the direction (0.6, 0.8), turning by 0.5 rad/s.
+        let by_instant = Vector3::new(0.6, 0.8, 0.5);
+        let plain = CorrelatedErrors::of(None, [2.0, 3.0], by_instant).expect("instants err");
+        let on_paper = Matrix3::new(8.36, 0.48, 0.3, 0.48, 8.64, 0.4, 0.3, 0.4, 27.25);
+        assert!((plain.covariance([4.0, 9.0]) - on_paper).amax() < ROUNDING, "{}", plain.covariance([4.0, 9.0]));
+        // They have no part in what the instrument's own variances do.
+        let own = NoiseShape::independent([2.0, 3.0]).covariance_by([4.0, 9.0]);
+        assert_eq!(plain.covariance_by([4.0, 9.0]), own);
+        let stated = CorrelatedErrors::of(Some(SHAPE), [2.0, 3.0], Vector3::zeros()).expect("a row states it");
+        assert_eq!(stated.covariance([4.0, 9.0]), SHAPE.covariance([4.0, 9.0]));
+    }
+
+    #[test]
+    fn whitened_components_are_independent_and_keep_their_meaning() {
+        let (sin, cos) = 0.7_f64.sin_cos();
+        let axes = [Vector3::new(cos, sin, 0.0), Vector3::new(-sin, cos, 0.0), Vector3::z()];
+        let errors = CorrelatedErrors::of(Some(SHAPE), [1.0; 2], Vector3::new(0.3, -0.4, 0.2)).expect("correlated");
+        let r = errors.covariance([4.0, 9.0]);
+        let Whitened { axes: found, variance } = errors.whitened(axes, [4.0, 9.0]);
+        for (row, column) in (0..9).map(|k| (k / 3, k % 3)) {
+            let covariance = found[row].dot(&(r * found[column]));
+            let on_paper = if row == column { variance[row] } else { 0.0 };
+            // Elements of up to 30.
+            assert!((covariance - on_paper).abs() < 1e-11, "{row} {column}: {covariance} {on_paper}");
+            // L is unit lower triangular in the robot's frame: a component has itself once, and none behind.
+            let share = found[row].dot(&axes[column]);
+            assert!(row > column || (share - f64::from(u8::from(row == column))).abs() < ROUNDING, "{row} {column}");
+        }
+        // The product of the variances is the determinant.
+        assert!((variance.iter().product::<f64>() / r.determinant() - 1.0).abs() < ROUNDING);
+    }
+}

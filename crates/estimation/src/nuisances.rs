@@ -270,3 +270,17 @@ impl ModelFit<'_> {
         model.own.as_ref().zip(response).is_some_and(|(own, response)| own.is_shown(response, column))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mean_has_its_standard_error_from_two_values_on() {
+        // Of 1 to 4: squares of 2.25 + 0.25 + 0.25 + 2.25 over three, and over four values.
+        let (mean, error) = mean_and_error(&[1.0, 2.0, 3.0, 4.0]).expect("four");
+        assert!((mean - 2.5).abs() < 1e-15 && (error - (5.0_f64 / 12.0).sqrt()).abs() < 1e-15, "{mean} {error}");
+        assert_eq!(mean_and_error(&[1.0, 3.0]), Some((2.0, 1.0)));
+        assert_eq!((mean_and_error(&[1.0]), mean_and_error(&[])), (None, None));
+    }
+}

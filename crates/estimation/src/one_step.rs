@@ -290,3 +290,82 @@ impl ModelFit<'_> {
         Ok(is_near)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use dataset::{Existing, write};
+    use kinematics::{Pose, Wheels};
+
+    use super::*;
+    use crate::GroupExtrinsics;
+    use crate::tests::{BODY_FROM_SENSOR, MODEL, NOISE, dataset_of};
+
+    fn gathered(test: &str, dataset: &Dataset, fit: &mut ModelFit<'_>, part_blocks: usize) -> GatheredParts {
+        let folder = std::env::temp_dir().join(format!("yair-{test}-{}", std::process::id()));
+        write(dataset, &folder, Existing::ReplaceDataset).expect("written");
+        let mut blocks = [Blocks::open(&folder).expect("readable").expect("runs stand together")];
+        let found = fit.gather(&mut blocks, part_blocks, &mut |_, _| {}).expect("readable");
+        std::fs::remove_dir_all(folder).expect("removed");
+        found
+    }
+
+    #[test]
+    fn parts_say_what_runs_say_and_runs_without_measurements_are_unused() {
+        let mut dataset = dataset_of(4, true);
+        dataset.runs[1].truth.truncate(1);
+        dataset.runs[3].truth.truncate(1);
+        let mut fit = ModelFit::from_parameters(MODEL, NOISE, &[dataset.session()]);
+        let whole = fit.scan(&mut []).runs;
+        let GatheredParts { parts, measurements } = gathered("unused", &dataset, &mut fit, 1);
+        // Seven of each run that has two. Rejects runs of which some part is unused, and runs that are used.
+        assert_eq!((measurements, &fit.records.unused), (14, &vec![(0, 1), (0, 3)]));
+        assert_eq!(parts.iter().map(|part| part.run).collect::<Vec<_>>(), [(0, 0), (0, 2)]);
+        for (part, whole) in parts.iter().zip(&whole) {
+            assert_eq!((part.run, part.count), (whole.run, whole.count));
+            // Files have all digits; sums are taken in one order.
+            assert!((&part.gradient - &whole.gradient).amax() < 1e-9 * whole.gradient.amax(), "{part:?} {whole:?}");
+        }
+    }
+
+    #[test]
+    fn a_run_with_an_instrument_of_its_own_is_one_part_however_many_blocks_it_has() {
+        // A block of 1024 rows, and one of the others.
+        let mut dataset = dataset_of(1, true);
+        let run = &mut dataset.runs[0];
+        let turned = |row: u32| f64::from(row) + 0.3 * (0.11 * f64::from(row)).sin();
+        let angles = |by: f64| (0..2100).map(|row| by * turned(row)).collect::<Vec<f64>>();
+        run.odometry.t_s = (0..2100).map(|row| 0.1 * f64::from(row)).collect();
+        run.odometry.wheels = dataset::WheelLog::Angles(Wheels { left: angles(0.1), right: angles(0.11) });
+        let sample = |row: u32| dataset::TruthSample::new(0.1 * f64::from(row), 0.0, 0.0, Some(0.0));
+        run.truth = (0..2100).step_by(50).map(sample).collect();
+        let own = GroupExtrinsics::new(Grouping::Run, vec![Column::SensorX]);
+        let by_session = GroupExtrinsics::new(Grouping::Session, vec![Column::SensorX]);
+        let parts = |own: Option<GroupExtrinsics>| {
+            let mut fit = ModelFit::from_parameters(Model { own, ..MODEL }, NOISE, &[dataset.session()]);
+            fit.ungated = true;
+            gathered("blocks", &dataset, &mut fit, 1).parts.len()
+        };
+        assert_eq!([parts(None), parts(Some(by_session)), parts(Some(own))], [2, 2, 1]);
+    }
+
+    #[test]
+    fn runs_with_instruments_of_their_own_have_them_from_all_of_their_blocks() {
+        let dataset = dataset_of(2, true);
+        let own = GroupExtrinsics::new(Grouping::Run, vec![Column::SensorX, Column::SensorY]);
+        let common =
+            Model { body_from_sensor: Pose { x_m: 0.0, y_m: 0.0, ..BODY_FROM_SENSOR }, own: Some(own), ..MODEL };
+        let mut fit = ModelFit::from_parameters(common, NOISE, &[dataset.session()]);
+        let parts = gathered("own", &dataset, &mut fit, 1).parts;
+        assert_eq!(parts.len(), 2);
+        let found = fit.solution.model.own.expect("own").of;
+        assert_eq!(found.keys().copied().collect::<Vec<_>>(), [(0, 0), (0, 1)]);
+        for instrument in found.values() {
+            let Pose { x_m, y_m, .. } = instrument.body_from_sensor;
+            // Measurements of 3 mm over turns of a radian. Rejects the common instrument, 32 and 19 mm off.
+            assert!(
+                (x_m - BODY_FROM_SENSOR.x_m).abs() < 0.01 && (y_m - BODY_FROM_SENSOR.y_m).abs() < 0.01,
+                "{x_m} {y_m}"
+            );
+        }
+    }
+}

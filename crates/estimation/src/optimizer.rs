@@ -471,3 +471,6 @@ pub(crate) fn start_heading(segment: &Segment<'_>, model: &Model, from: usize) -
     }
     heading_rad
 }
+
+#[cfg(test)]
+mod tests;

@@ -325,3 +325,6 @@ fn noise_from_log(session: &Session<'_>) -> Option<f64> {
     };
     Some(variance.sqrt().max(crate::settings::MIN_GYRO_NOISE_RAD_PER_SQRT_S))
 }
+
+#[cfg(test)]
+mod tests;

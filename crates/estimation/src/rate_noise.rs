@@ -114,3 +114,133 @@ fn instants_of_rows(intervals: &[WheelInterval]) -> impl Iterator<Item = f64> {
     let ends = intervals.windows(2).filter(|pair| !pair[1].starts_within_row).map(|pair| pair[0].t_s + pair[0].dt_s);
     intervals.iter().filter(|interval| !interval.starts_within_row).map(|interval| interval.t_s).chain(ends)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const EXACT: [Wheels<f64>; 2] = [Wheels { left: 0.0, right: 0.0 }; 2];
+
+    fn interval(t_s: f64, dt_s: f64, wheel_rad: Wheels<f64>, starts_within_row: bool) -> WheelInterval {
+        WheelInterval {
+            t_s,
+            dt_s,
+            wheel_rad,
+            late_s: [0.0; 2],
+            rate_rad_s: Wheels { left: 10.0, right: 20.0 },
+            rate_at_ends_rad_s: [Wheels { left: 30.0, right: 40.0 }, Wheels { left: 50.0, right: 60.0 }],
+            chord_area_rad2: 0.0,
+            stands: false,
+            starts_within_row,
+            interpolated_rad2: EXACT,
+        }
+    }
+
+    /// Rows at 0, 1 and 3 s.
+    fn noise(row_by_row: bool) -> RateNoise {
+        RateNoise {
+            t_s: vec![0.0, 1.0, 3.0],
+            angle_rad: [vec![0.0, 0.5, 2.0], vec![0.25, 0.0, -1.0]],
+            rate_rad_s: [vec![1.0, 2.0, 4.0], vec![-1.0, 0.0, 8.0]],
+            row_by_row,
+        }
+    }
+
+    fn added(noise: &RateNoise, t_s: f64, dt_s: f64) -> (Wheels<f64>, [Wheels<f64>; 2]) {
+        let before = interval(t_s, dt_s, Wheels::both(1.0), false);
+        let mut after = before;
+        noise.add_to(&mut after);
+        assert_eq!((after.wheel_rad, after.t_s, after.dt_s), (before.wheel_rad, before.t_s, before.dt_s));
+        let by = |after: Wheels<f64>, before: Wheels<f64>| after.zip_with(before, |after, before| after - before);
+        let ends = [0, 1].map(|end| by(after.rate_at_ends_rad_s[end], before.rate_at_ends_rad_s[end]));
+        (by(after.rate_rad_s, before.rate_rad_s), ends)
+    }
+
+    #[test]
+    fn the_noise_of_a_rate_is_that_of_its_row_and_goes_over_to_the_next() {
+        let wheels = |left, right| Wheels { left, right };
+        // Numbers of few bits, which sums do not round. A quarter and three quarters of the second row.
+        let ends = [wheels(2.5, 2.0), wheels(3.5, 6.0)];
+        assert_eq!(added(&noise(false), 1.5, 1.0), (wheels(3.0, 4.0), ends));
+        // Where rows say their own rates, the noise of their counts over their length.
+        assert_eq!(added(&noise(true), 1.5, 1.0), (wheels(0.75, -0.5), ends));
+        // A whole row, which begins at a stamp that is rounded.
+        let ends = [wheels(1.0, -1.0), wheels(2.0, 0.0)];
+        assert_eq!(added(&noise(false), 0.0, 1.0), (wheels(1.5, -0.5), ends));
+        let (_, rounded) = added(&noise(false), 1.0 - 1e-10, 2.0);
+        assert!((rounded[0].left - 2.0).abs() < 1e-9 && (rounded[1].right - 8.0).abs() < 1e-8, "{rounded:?}");
+        // Before the first row and after the last, as there.
+        let (_, before) = added(&noise(true), -0.5, 0.25);
+        let (own, after) = added(&noise(true), 3.0, 0.5);
+        assert_eq!((before, after), ([wheels(1.0, -1.0); 2], [wheels(4.0, 8.0); 2]));
+        assert_eq!(own, wheels(4.0, 8.0));
+    }
+
+    #[test]
+    fn rows_begin_where_intervals_do_and_end_where_the_last_of_them_does() {
+        let still = Wheels::both(0.0);
+        // Half of a row from within it, two halves of a row, a whole one, and half of the last.
+        let intervals = [
+            interval(0.5, 0.5, still, true),
+            interval(1.0, 0.5, still, false),
+            interval(1.5, 0.5, still, true),
+            interval(2.0, 1.0, still, false),
+            interval(3.0, 0.5, still, false),
+        ];
+        let mut found: Vec<f64> = instants_of_rows(&intervals).collect();
+        found.sort_unstable_by(f64::total_cmp);
+        found.dedup();
+        // Rejects instants at which a measurement is within a row: 0.5, 1.5 and 3.5 s.
+        assert_eq!(found, [1.0, 2.0, 3.0]);
+        // Of a gap both sides: an interval ends at 2 s, and the next begins at 5 s.
+        let apart = [interval(1.0, 1.0, still, false), interval(5.0, 1.0, still, false)];
+        let mut found: Vec<f64> = instants_of_rows(&apart).collect();
+        found.sort_unstable_by(f64::total_cmp);
+        assert_eq!(found, [1.0, 2.0, 5.0]);
+    }
+
+    /// A segment of 400 rows of a second; the left wheel stands in the second half, the right one turns in
+    /// every fourth row alone.
+    fn drawn(row_by_row: bool) -> RateNoise {
+        let dataset = crate::tests::dataset_of(1, true);
+        let session = dataset.session();
+        let mut segment = crate::Records::of(&[session]).segments.remove(0);
+        let wheel_rad = |row: usize| Wheels {
+            left: if row < 200 { 0.5 } else { 0.0 },
+            right: if row.is_multiple_of(4) { -0.5 } else { 0.0 },
+        };
+        segment.intervals = (0..400).map(|row| interval(row as f64, 1.0, wheel_rad(row), false)).collect();
+        (segment.quantum_rad, segment.rate_window) =
+            (Wheels { left: 0.5, right: 0.25 }, RateWindow { rows: 1, row_by_row });
+        RateNoise::of(&[&mut segment], Xoshiro256PlusPlus::seed_from_u64(5))
+    }
+
+    #[test]
+    fn a_count_is_off_by_up_to_half_of_itself_and_keeps_it_while_the_wheel_stands() {
+        let RateNoise { t_s, angle_rad: [left, right], rate_rad_s, row_by_row } = drawn(false);
+        assert!(!row_by_row && drawn(true).row_by_row);
+        // The end of the last interval is within a row, as far as the log says.
+        assert_eq!((t_s.len(), left.len(), right.len()), (400, 400, 400));
+        for (errors, quantum_rad) in [(&left, 0.5), (&right, 0.25)] {
+            assert!(errors.iter().all(|error| error.abs() <= 0.5 * quantum_rad));
+            let distinct: std::collections::BTreeSet<u64> = errors.iter().map(|error| error.to_bits()).collect();
+            // The first row, and one for every row of which the interval before it turned: 200, or 100.
+            assert_eq!(distinct.len(), if quantum_rad > 0.3 { 201 } else { 101 });
+            let n = distinct.len() as f64;
+            let squares: f64 = distinct.iter().map(|bits| f64::from_bits(*bits).powi(2)).sum();
+            let mean = distinct.iter().map(|bits| f64::from_bits(*bits)).sum::<f64>() / n;
+            // Uniform: q²/12, of which the mean square of n draws has the standard error √(4/5n), 9 %, and
+            // the mean q/√(12 n): four of them. Rejects draws about half a count.
+            assert!((squares / n / (quantum_rad * quantum_rad / 12.0) - 1.0).abs() < 0.36, "{}", squares / n);
+            assert!(mean.abs() < 4.0 * quantum_rad / (12.0 * n).sqrt(), "{mean}");
+        }
+        // Which rows: behind an interval that turned.
+        assert!((1..=200).all(|row| left[row] != left[row - 1]) && (201..400).all(|row| left[row] == left[row - 1]));
+        assert!((1..400).all(|row| (right[row] != right[row - 1]) == (row % 4 == 1)));
+        // Rates go by the rows beside each: slopes over one row to each side.
+        let on_paper = |errors: &[f64], row: usize| 0.5 * (errors[row + 1] - errors[row - 1]);
+        for (side, errors) in [&left, &right].into_iter().enumerate() {
+            assert!((1..399).all(|row| (rate_rad_s[side][row] - on_paper(errors, row)).abs() < 1e-15), "{side}");
+        }
+    }
+}

@@ -17,11 +17,13 @@ mod golden_numbers;
 mod groups;
 mod intervals;
 mod map;
+mod nuisances;
 mod one_step;
 mod partial;
 mod partial_poses;
 mod path_shape;
 mod rate_noise;
+mod records;
 mod rounding;
 mod scores;
 mod selection;
@@ -39,7 +41,7 @@ fn dataset(with_headings: bool) -> Dataset {
 }
 
 /// The same of another number of runs.
-fn dataset_of(runs: u32, with_headings: bool) -> Dataset {
+pub(crate) fn dataset_of(runs: u32, with_headings: bool) -> Dataset {
     let run = |number: u32| {
         let mut angles = Wheels { left: vec![0.0], right: vec![0.0] };
         let mut pose = Pose::new(0.2, -0.1, 0.5 + f64::from(number));
@@ -224,10 +226,10 @@ fn a_fit_sums_the_products_that_it_steps_along() {
     assert_ne!(own.information[(x, y)], all.information[(x, y)]);
 }
 
-const BODY_FROM_SENSOR: Pose = Pose::new(0.03, -0.02, 0.1);
+pub(crate) const BODY_FROM_SENSOR: Pose = Pose::new(0.03, -0.02, 0.1);
 
 /// About a standard deviation from the true model.
-const MODEL: Model = Model {
+pub(crate) const MODEL: Model = Model {
     m_per_rad: Wheels { left: 0.0812, right: 0.0796 },
     separation_m: 0.3665,
     body_from_sensor: Pose::new(0.032, -0.019, 0.103),
@@ -241,7 +243,7 @@ fn model() -> Model {
     Model { term_values: vec![0.004, -0.003], ..MODEL }
 }
 
-const NOISE: Noise = Noise { variance: [1e-6, 4e-6, 9e-6, 2.5e-5], timing_s2: 0.0 };
+pub(crate) const NOISE: Noise = Noise { variance: [1e-6, 4e-6, 9e-6, 2.5e-5], timing_s2: 0.0 };
 
 fn run(dataset: &Dataset, model: &Model, noise: &Noise, headings: &[f64], pass_options: PassOptions) -> Pass {
     let model = &Model {

@@ -23,7 +23,7 @@ fn thinned_measurements_are_far_enough_apart_and_end_with_the_last() {
 }
 
 /// Normal variables by the sum of twelve uniform ones of `SplitMix64` (Steele, Lea & Flood 2014).
-struct Normals(u64);
+pub(super) struct Normals(pub(super) u64);
 
 impl Normals {
     fn uniform(&mut self) -> f64 {
@@ -34,7 +34,7 @@ impl Normals {
         f64::from(u32::try_from((z ^ (z >> 31)) >> 32).expect("half of the bits")) / f64::from(u32::MAX)
     }
 
-    fn next(&mut self) -> f64 {
+    pub(super) fn next(&mut self) -> f64 {
         (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
     }
 }
