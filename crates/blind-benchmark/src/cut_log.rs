@@ -3,8 +3,8 @@
 use dataset::{Dataset, Displacement, Run, WheelLog};
 use kinematics::Wheels;
 
-/// How long a robot stands at a cut, seconds: less than between programs that were joined, by what rows may be
-/// late.
+/// How long a robot stands at a cut, seconds: less than between programs that were joined, by what rows may
+/// be late.
 const MIN_STOP_S: f64 = 0.8;
 
 /// Instants of a dataset's runs, seconds from the start of each: the middle of its stops.
@@ -15,8 +15,8 @@ pub(crate) fn stops(dataset: &Dataset) -> Stops {
     dataset.runs.iter().map(stops_of).collect()
 }
 
-/// The dataset with each run cut at the rows nearest to some instants. Rows and measurements stay as they are; a
-/// displacement over a cut is left out.
+/// The dataset with each run cut at the rows nearest to some instants. Rows and measurements stay as they
+/// are; a displacement over a cut is left out.
 pub(crate) fn cut_at(dataset: &Dataset, stops: &Stops) -> Dataset {
     let runs = dataset.runs.iter().zip(stops).flat_map(|(run, stops)| cut(run, stops));
     Dataset { runs: runs.collect(), ..dataset.clone() }
@@ -87,8 +87,9 @@ mod tests {
 
     use super::*;
 
-    /// Rows of 0.1 s: 1 s at rest, 2 s of motion, 1.1 s at rest, 2 s of motion, 0.5 s at rest, motion again, and
-    /// 1 s at rest; a pose in the middle of every fifth row, and displacements from each pose to the next.
+    /// Rows of 0.1 s: 1 s at rest, 2 s of motion, 1.1 s at rest, 2 s of motion, 0.5 s at rest, motion again,
+    /// and 1 s at rest; a pose in the middle of every fifth row, and displacements from each pose to the
+    /// next.
     fn log() -> Dataset {
         let moves = |row: i64| (10..30).contains(&row) || (41..61).contains(&row) || (66..80).contains(&row);
         let mut ticks = vec![7_i64];

@@ -287,8 +287,8 @@ mod tests {
 
     #[test]
     fn of_an_even_spin_the_rounding_of_counts_says_nothing() {
-        // 155 ticks a turn; poses at 20 Hz, exact. Rejects squares without the rounding's own: several of these
-        // speeds, whose poses fall alike between counts, have an offset then.
+        // 155 ticks a turn; poses at 20 Hz, exact. Rejects squares without the rounding's own: several of
+        // these speeds, whose poses fall alike between counts, have an offset then.
         let spin = |number: u32| {
             let rate_rad_s = 2.0 + 0.05 * f64::from(number);
             let mut log = driven(&[0.0; 4]);

@@ -2,7 +2,8 @@
 //!
 //! Speeds and accelerations that are found in counts have their rounding. A term that goes by it is estimated
 //! too small, and what is left of a larger one is given to others ([`ModelFit::with_noisier_rates`]). A term
-//! of which rounding makes more than a share is none that these data can tell of: not resolved by this encoder.
+//! of which rounding makes more than a share is none that these data can tell of: not resolved by this
+//! encoder.
 
 use estimation::ModelFit;
 use nalgebra::DMatrix;

@@ -2,8 +2,8 @@
 //!
 //! The map's error at a place is the same whenever the robot is there, in every run: it does not average out,
 //! and neither whiteness of innovations nor scatter over runs shows it. The fit is linear in what was
-//! measured near its solution. So each function of which the distortion is made ([`map_functions`]) shifts the
-//! poses, one pass gives the gradients, and I⁻¹ (Σ g gᵀ) I⁻¹ is the covariance that all of them make.
+//! measured near its solution. So each function of which the distortion is made ([`map_functions`]) shifts
+//! the poses, one pass gives the gradients, and I⁻¹ (Σ g gᵀ) I⁻¹ is the covariance that all of them make.
 
 use dataset::MapDistortion;
 use nalgebra::{DMatrix, DVector};

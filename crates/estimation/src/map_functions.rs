@@ -1,10 +1,10 @@
-//! A Gaussian process over the places of a map as a sum of functions with independent coefficients of variance
-//! 1: its covariance is e^{−d²/2ℓ²} between places that are d apart.
+//! A Gaussian process over the places of a map as a sum of functions with independent coefficients of
+//! variance 1: its covariance is e^{−d²/2ℓ²} between places that are d apart.
 //!
 //! Where the places cover few lengths ℓ these are the columns of the incomplete Cholesky factor of their
-//! covariance, the place with the largest remaining variance first (Fine & Scheinberg 2001): as few as the places
-//! need, and right at every distance and in every direction. Where they are too many, waves at quantiles of the
-//! process's spectrum (Rahimi & Recht 2007), which are right on average over directions.
+//! covariance, the place with the largest remaining variance first (Fine & Scheinberg 2001): as few as the
+//! places need, and right at every distance and in every direction. Where they are too many, waves at
+//! quantiles of the process's spectrum (Rahimi & Recht 2007), which are right on average over directions.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -162,8 +162,8 @@ mod tests {
             let there = [here[0] + distance_m * direction_rad.cos(), here[1] + distance_m * direction_rad.sin()];
             worst = worst.max((covariance(&functions, here, there) - stated(here, there, 0.5)).abs());
         }
-        // The mean of 64 cosines at quantiles of the spectrum: some dozens of directions for each length leave
-        // 1/64 of each. Rejected: the spectrum of e^{−d²/ℓ²}, off by 0.24, and waves along x alone.
+        // The mean of 64 cosines at quantiles of the spectrum: some dozens of directions for each length
+        // leave 1/64 of each. Rejected: the spectrum of e^{−d²/ℓ²}, off by 0.24, and waves along x alone.
         assert!(worst < 0.05, "{worst}");
     }
 

@@ -1,10 +1,11 @@
 //! What the rounding of counts does to the covariates of terms.
 //!
-//! A rate that is found in counts has their rounding, and a term that goes by it is estimated too small by the
-//! share of the rounding in what it varies by (errors in variables; Fuller 1987). Where the same noise is added
-//! once more, the term's information grows by what the noise has in it (simulation and extrapolation; Cook &
-//! Stefanski 1994): with I the information of a term and I' that with noise added, (2 I − I')/I is the share
-//! of the motion, the *reliability* of the term. It needs no formula for what a term makes of the rates.
+//! A rate that is found in counts has their rounding, and a term that goes by it is estimated too small by
+//! the share of the rounding in what it varies by (errors in variables; Fuller 1987). Where the same noise is
+//! added once more, the term's information grows by what the noise has in it (simulation and extrapolation;
+//! Cook & Stefanski 1994): with I the information of a term and I' that with noise added, (2 I − I')/I is the
+//! share of the motion, the *reliability* of the term. It needs no formula for what a term makes of the
+//! rates.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
