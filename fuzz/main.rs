@@ -241,6 +241,12 @@ fn regress_information_beyond_doubles_is_no_evidence() {
     mended("diagnosis", &[300_015_556, 300_026_141, 300_030_664]);
 }
 
+/// Information that only rounding inverts gave a latency ± NaN: such a fit has no covariance.
+#[test]
+fn regress_a_covariance_of_rounding_is_none() {
+    mended("calibrators", &[400_125_627]);
+}
+
 /// Which number is under way, for executions that end the process: memory that runs out, a stack that does.
 fn note(line: &str) {
     if let Ok(file) = std::env::var("YAIR_FUZZ_NOTE") {

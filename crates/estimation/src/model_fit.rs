@@ -359,7 +359,8 @@ impl ModelFit<'_> {
 
     /// Covariance of the free columns. Where runs are few and innovations white it is the inverse
     /// information; else it is cluster-robust over runs, with the leverage of each (Liang & Zeger 1986; Bell
-    /// & McCaffrey 2002). A stated distortion of the map adds to it. `terms` are those of the fit.
+    /// & McCaffrey 2002). A stated distortion of the map adds to it. `terms` are those of the fit. `None` where
+    /// rounding is all that there is of it.
     #[must_use]
     pub fn covariance(&self, terms: &mut [Box<dyn ModelTerm>]) -> Option<DMatrix<f64>> {
         let free = self.free_basis();
@@ -368,7 +369,7 @@ impl ModelFit<'_> {
         let enough = if self.thinning == Thinning::NONE { MIN_CLUSTERS } else { free.ncols() + MIN_SPARE_CLUSTERS };
         if units.len() < enough {
             let own = &inverse + self.map_covariance(&free, &inverse, OwnScatter::NotCounted, terms);
-            return Some(&free * own * free.transpose());
+            return with_variances(&free * own * free.transpose());
         }
         let clusters = units.iter().map(|unit| unit.of(&self.columns).along(&free));
         let mut robust = ClusterRobust::of(&inverse, clusters).covariance;
@@ -379,7 +380,7 @@ impl ModelFit<'_> {
             robust += &by_scale * by_scale.transpose();
         }
         robust += self.map_covariance(&free, &inverse, OwnScatter::Counted, terms);
-        Some(&free * robust * free.transpose())
+        with_variances(&free * robust * free.transpose())
     }
 
     /// What a stated distortion of the instrument's map adds to the covariance along a basis.
@@ -476,4 +477,11 @@ fn geometry_information(matrix: &DMatrix<f64>) -> Matrix3<f64> {
         DMatrix::zeros(3, 3)
     };
     Matrix3::from_iterator((own - rest).iter().copied())
+}
+
+/// A covariance whose variances are numbers and not below 0, as rounding leaves them of information that only
+/// rounding inverts.
+fn with_variances(covariance: DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let is_variance = |variance: &f64| variance.is_finite() && *variance >= 0.0;
+    covariance.diagonal().iter().all(is_variance).then_some(covariance)
 }
