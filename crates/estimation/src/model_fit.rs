@@ -359,8 +359,8 @@ impl ModelFit<'_> {
 
     /// Covariance of the free columns. Where runs are few and innovations white it is the inverse
     /// information; else it is cluster-robust over runs, with the leverage of each (Liang & Zeger 1986; Bell
-    /// & McCaffrey 2002). A stated distortion of the map adds to it. `terms` are those of the fit. `None` where
-    /// rounding is all that there is of it.
+    /// & McCaffrey 2002). A stated distortion of the map adds to it. `terms` are those of the fit. `None`
+    /// where rounding is all that there is of it.
     #[must_use]
     pub fn covariance(&self, terms: &mut [Box<dyn ModelTerm>]) -> Option<DMatrix<f64>> {
         let free = self.free_basis();
