@@ -170,12 +170,10 @@ impl Case {
             CaseKind::Large => LARGE_RATIOS,
             CaseKind::Null | CaseKind::Single | CaseKind::LeftOut => SINGLE_RATIOS,
         };
-        let mut stops: Vec<Stops> = Vec::new();
         let weak = hidden.iter().any(|hidden| hidden.kind != EffectKind::RecordFault);
         let plain = if weak { drive(&robot.sessions, &measurement, &[], false, 0)? } else { Vec::new() };
-        if case_kind == CaseKind::OneLog {
-            stops = plain.iter().map(cut_log::stops).collect();
-        }
+        let is_cut = case_kind == CaseKind::OneLog;
+        let stops: Vec<Stops> = plain.iter().filter(|_| is_cut).map(cut_log::stops).collect();
         // An effect of one log is as large as the cut one shows it, where every run starts anew.
         let plain = cut_into_runs(plain, &stops);
         let noise = TrueNoise::of(&conditions, &instrument_model, mean_square_motion(&plain));
@@ -272,7 +270,7 @@ impl Case {
 
     /// Its long logs cut into runs; none where that is not asked.
     pub(crate) fn cut(&self) -> Vec<Dataset> {
-        self.datasets.iter().zip(&self.stops).map(|(dataset, stops)| cut_log::cut_at(dataset, stops)).collect()
+        cut_log::cut_all(&self.datasets, &self.stops)
     }
 
     /// The session on other paths, without noise.
@@ -306,10 +304,7 @@ pub(crate) struct FurtherRuns {
 
 /// Logs cut into runs, where that is asked.
 fn cut_into_runs(logs: Vec<Dataset>, stops: &[Stops]) -> Vec<Dataset> {
-    if stops.is_empty() {
-        return logs;
-    }
-    logs.iter().zip(stops).map(|(log, stops)| cut_log::cut_at(log, stops)).collect()
+    if stops.is_empty() { logs } else { cut_log::cut_all(&logs, stops) }
 }
 
 enum Chosen {

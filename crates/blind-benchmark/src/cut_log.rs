@@ -17,9 +17,14 @@ pub(crate) fn stops(dataset: &Dataset) -> Stops {
 
 /// The dataset with each run cut at the rows nearest to some instants. Rows and measurements stay as they
 /// are; a displacement over a cut is left out.
-pub(crate) fn cut_at(dataset: &Dataset, stops: &Stops) -> Dataset {
+fn cut_at(dataset: &Dataset, stops: &Stops) -> Dataset {
     let runs = dataset.runs.iter().zip(stops).flat_map(|(run, stops)| cut(run, stops));
     Dataset { runs: runs.collect(), ..dataset.clone() }
+}
+
+/// The same of several datasets.
+pub(crate) fn cut_all(datasets: &[Dataset], stops: &[Stops]) -> Vec<Dataset> {
+    datasets.iter().zip(stops).map(|(dataset, stops)| cut_at(dataset, stops)).collect()
 }
 
 fn cut(run: &Run, stops: &[f64]) -> Vec<Run> {

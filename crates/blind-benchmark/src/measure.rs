@@ -171,18 +171,18 @@ fn large(cases: &[CaseResult]) -> Vec<Measure> {
 
 /// Whether one long log and the same cut into runs have the same name first, where either has one.
 fn one_log(cases: &[CaseResult]) -> Option<Measure> {
-    let first = |mut findings: Box<dyn Iterator<Item = &Reported> + '_>| findings.next()?.names.first().cloned();
-    let names: Vec<[Option<String>; 2]> = cases
+    let names: Vec<[Option<&str>; 2]> = cases
         .iter()
         .filter(|case| case.case_kind == CaseKind::OneLog)
-        .map(|case| [first(Box::new(case.findings())), first(Box::new(case.findings_of_cut()))])
+        .map(|case| [case.findings().next(), case.findings_of_cut().next()])
+        .map(|first| first.map(|found| found.map(|found| found.names[0].as_str())))
         .filter(|[whole, cut]| whole.is_some() || cut.is_some())
         .collect();
     (!names.is_empty()).then(|| {
         share(
             "same_first_name",
             "findings whose first name is the same in one long log and in the same log cut into runs",
-            count(names.iter(), |[whole, cut]: &[Option<String>; 2]| whole == cut),
+            count(names.iter(), |[whole, cut]: &[Option<&str>; 2]| whole == cut),
             0.9,
             false,
         )

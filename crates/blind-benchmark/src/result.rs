@@ -57,8 +57,8 @@ pub struct CaseResult {
     #[serde(rename = "said")]
     pub reported: Vec<Reported>,
     /// What was found in the same log cut into runs, where that was asked.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub said_of_cut: Option<Vec<Reported>>,
+    #[serde(rename = "said_of_cut", default, skip_serializing_if = "Option::is_none")]
+    pub reported_of_cut: Option<Vec<Reported>>,
     /// Checks that failed at the end.
     pub failed_checks: Vec<String>,
     /// Why there is no diagnosis.
@@ -93,7 +93,7 @@ impl CaseResult {
 
     /// The same of the log cut into runs; none where that was not asked.
     pub(crate) fn findings_of_cut(&self) -> impl Iterator<Item = &Reported> {
-        self.not_exempt(self.said_of_cut.as_deref().unwrap_or_default())
+        self.not_exempt(self.reported_of_cut.as_deref().unwrap_or_default())
     }
 
     fn not_exempt<'a>(&'a self, all: &'a [Reported]) -> impl Iterator<Item = &'a Reported> {

@@ -45,7 +45,7 @@ pub(crate) fn score(number: u64, case: &Case, scope: Scope) -> Result<CaseResult
         counts,
         hidden: case.oracle.clone(),
         reported: Vec::new(),
-        said_of_cut: None,
+        reported_of_cut: None,
         failed_checks: Vec::new(),
         refused: None,
         extended: false,
@@ -54,8 +54,9 @@ pub(crate) fn score(number: u64, case: &Case, scope: Scope) -> Result<CaseResult
         planned: None,
     };
     if scope == Scope::OneLog {
-        let said = diagnose(&case.cut(), &Options::default());
-        result.said_of_cut = Some(said.map_or_else(|_| Vec::new(), |diagnosis| reported(&diagnosis.document, case)));
+        let of_cut = diagnose(&case.cut(), &Options::default());
+        let of_cut = of_cut.map_or_else(|_| Vec::new(), |diagnosis| reported(&diagnosis.document, case));
+        result.reported_of_cut = Some(of_cut);
     }
     match diagnosed {
         Ok(diagnosis) => {

@@ -80,7 +80,7 @@ impl Status {
     }
 }
 
-/// Why a term is none that the data can tell of.
+/// Why a term that the encoders do not resolve is not tested.
 pub(crate) const NOT_RESOLVED: &str =
     "not resolved by these encoders: the speeds that it goes by are mostly rounding of counts";
 

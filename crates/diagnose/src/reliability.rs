@@ -1,9 +1,8 @@
 //! Which terms the encoders resolve: how much of what a term goes by is motion, and how much is rounding.
 //!
-//! Speeds and accelerations that are found in counts have their rounding. A term that goes by it is estimated
-//! too small, and what is left of a larger one is given to others ([`ModelFit::with_noisier_rates`]). A term
-//! of which rounding makes more than a share is none that these data can tell of: not resolved by this
-//! encoder.
+//! Speeds and accelerations by counts have the rounding of the counts. The size of a term in them is
+//! estimated too small, and other terms take up what is left ([`ModelFit::with_noisier_rates`]). A term of
+//! whose information rounding makes more than a share is not resolved by these encoders, and is not tested.
 
 use estimation::ModelFit;
 use nalgebra::DMatrix;

@@ -6,7 +6,7 @@
 //! places need, and right at every distance and in every direction. Where they are too many, waves at
 //! quantiles of the process's spectrum (Rahimi & Recht 2007), which are right on average over directions.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 use std::rc::Rc;
 
@@ -26,7 +26,7 @@ pub(crate) enum MapFunction {
 }
 
 impl MapFunction {
-    /// Its value at a place, metres; of columns, at one of the places that they were made for.
+    /// Its value at a place in metres; of columns, at one of the places that they were made for.
     pub(crate) fn at(&self, place: [f64; 2]) -> f64 {
         match self {
             Self::OfPlaces { factor, column } => factor.at(place, *column),
@@ -65,14 +65,14 @@ pub(crate) fn map_functions(places: impl Iterator<Item = [f64; 2]>, length_m: f6
 /// The factor; `None` where places need more than `MAX_MAP_FUNCTIONS` columns.
 fn factor(places: impl Iterator<Item = [f64; 2]>, length_m: f64) -> Option<Factor> {
     let cell_m = length_m / MAP_CELLS_PER_LENGTH;
-    let mut rows: BTreeMap<[i64; 2], Vec<f64>> = BTreeMap::new();
+    let mut cells: BTreeSet<[i64; 2]> = BTreeSet::new();
     for place in places {
-        rows.entry(cell(place, cell_m)).or_default();
-        if rows.len() > MAX_MAP_CELLS {
+        cells.insert(cell(place, cell_m));
+        if cells.len() > MAX_MAP_CELLS {
             return None;
         }
     }
-    let cells: Vec<[i64; 2]> = rows.keys().copied().collect();
+    let cells: Vec<[i64; 2]> = cells.into_iter().collect();
     let covariance = |a: [i64; 2], b: [i64; 2]| {
         let squared_m2: f64 = (0..2).map(|k| ((a[k] - b[k]) as f64 * cell_m).powi(2)).sum();
         (-0.5 * squared_m2 / (length_m * length_m)).exp()

@@ -60,7 +60,7 @@ impl RateNoise {
         let mut t_s: Vec<f64> = segments.iter().flat_map(|segment| instants_of_rows(&segment.intervals)).collect();
         t_s.sort_unstable_by(f64::total_cmp);
         t_s.dedup_by(|next, before| *next - *before <= TIME_TOLERANCE_S);
-        let pieces = pieces(&t_s, true);
+        let pieces = pieces(&t_s, segments[0].info.continuous);
         let angle_rad = Side::BOTH.map(|side| {
             let mut turns = vec![false; t_s.len()];
             for interval in segments.iter().flat_map(|segment| &segment.intervals) {

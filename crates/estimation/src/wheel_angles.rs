@@ -164,9 +164,9 @@ impl<'a> WheelAngleInterpolator<'a> {
         self.rates.quantum_rad
     }
 
-    /// How rates are found, as [`Segment`](crate::segment::Segment) keeps it.
+    /// How the rates at the rows are found.
     pub(crate) const fn rate_window(&self) -> RateWindow {
-        RateWindow { rows: self.rates.window, row_by_row: self.rates.row_by_row }
+        self.rates.window
     }
 
     /// A reader that goes through the log once.
@@ -234,7 +234,7 @@ impl<'a> WheelAngleInterpolator<'a> {
     /// How the wheels speed up from the row before to a row, and from it to the next, rad/s²; `None` where
     /// single rows do not say their rates, and at the ends of the log.
     fn accelerations_around(&self, row: usize) -> Option<[Wheels<f64>; 2]> {
-        if !self.rates.row_by_row || row == 0 || row + 2 >= self.t_s.len() {
+        if !self.rates.window.row_by_row || row == 0 || row + 2 >= self.t_s.len() {
             return None;
         }
         let middle_s = |row: usize| 0.5 * (self.t_s[row] + self.t_s[row + 1]);
@@ -345,7 +345,7 @@ impl Cursor<'_, '_> {
             let wheel_rad = next.zip_with(angle, |next, angle| next - angle);
             let dt_s = t_s - at_s;
             let ends = [at_s, t_s].map(|t_s| self.track.rate_at(row, t_s));
-            let rate_rad_s = if self.track.rates.row_by_row && dt_s > 0.0 {
+            let rate_rad_s = if self.track.rates.window.row_by_row && dt_s > 0.0 {
                 wheel_rad.map(|rad| rad / dt_s)
             } else {
                 ends[0].zip_with(ends[1], |start, end| 0.5 * (start + end))

@@ -20,12 +20,10 @@ use crate::settings::{
 pub(crate) struct WheelRates {
     /// At each row, rad/s.
     pub(crate) at_rows_rad_s: Wheels<Vec<f64>>,
-    /// Rows are so fine, and their stamps so exact, that a single interval says how fast the wheels turned.
-    pub(crate) row_by_row: bool,
     /// Radians that a count stands for; 0 where angles are not rounded.
     pub(crate) quantum_rad: Wheels<f64>,
-    /// Rows before a row by which its rates are found, and as many after.
-    pub(crate) window: usize,
+    /// How they are found.
+    pub(crate) window: RateWindow,
     /// First rows of the stretches without a gap, in order.
     starts: Vec<usize>,
     /// Rows between which and the one before a count came, in order.
@@ -84,7 +82,7 @@ impl WheelRates {
             variance.map(|variance| variance / squares)
         };
         let mut rates = of_window(RATE_WINDOWS[0]);
-        let mut window = RATE_WINDOWS[0];
+        let mut half_rows = RATE_WINDOWS[0];
         for pair in RATE_WINDOWS.windows(2) {
             let [now, wider] = [noise(pair[0]), noise(pair[1])];
             if is_below_signal(&rates, now, separation_m, m_per_rad) || variance == [0.0; 2] {
@@ -98,16 +96,17 @@ impl WheelRates {
             if blurs {
                 break;
             }
-            (rates, window) = (next, pair[1]);
+            (rates, half_rows) = (next, pair[1]);
         }
         let [left, right] = rates;
+        let window = RateWindow { rows: half_rows, row_by_row };
         let starts = pieces.iter().map(|piece| piece.start).collect();
         let came = |row: &usize| turns.iter().any(|turn_rad| turn_rad[*row] != turn_rad[row - 1]);
         let is_rounded = quanta.iter().any(|quantum| *quantum > 0.0);
         let counted = if is_rounded { (1..t_s.len()).filter(came).collect() } else { Vec::new() };
         let count_m = [0, 1].map(|side| quanta[side] * m_per_rad[side]).into_iter().fold(0.0, f64::max);
         let count_s = is_rounded.then(|| (2.0 * count_m / GENTLE_ACCELERATION_M_S2).sqrt());
-        Self { at_rows_rad_s: Wheels { left, right }, row_by_row, quantum_rad, window, starts, counted, count_s }
+        Self { at_rows_rad_s: Wheels { left, right }, window, quantum_rad, starts, counted, count_s }
     }
 
     /// Comes no count in a part of a row's interval, nor within the time that a robot which sets off gently

@@ -43,11 +43,9 @@ impl PhysicalEffect for ClockRate {
     }
 
     fn hypothesis() -> Hypothesis {
-        let of_session =
-            Variant { fixed: vec![("since_session_start", 1.0)], ..Variant::plain(Term { of_session: true, ..Term::default() }).remove(0) };
-        let mut variants = Variant::plain(Term::default());
-        variants.push(of_session);
-        Hypothesis::Terms(variants)
+        let of_session = Term { of_session: true, ..Term::default() };
+        let of_session = Variant { fixed: vec![("since_session_start", 1.0)], term: Box::new(of_session), at: None };
+        Hypothesis::Terms(Variant::plain(Term::default()).into_iter().chain([of_session]).collect())
     }
 
     fn description() -> Description {

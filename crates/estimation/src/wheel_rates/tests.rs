@@ -45,7 +45,7 @@ fn windows_grow_with_the_rounding_until_it_is_below_a_tenth_of_the_signal() {
         // Each wheel's rate varies by 1.65²/2; the turn, of the difference of two, by 0.32 of that. A
         // tenth of it, for both wheels.
         assert!(noise < 0.1 * 0.5 * 1.65 * 1.65 * 0.24, "{quantum_rad}: {noise}");
-        assert_eq!(found.row_by_row, quantum_rad < 1e-2, "{quantum_rad}");
+        assert_eq!(found.window.row_by_row, quantum_rad < 1e-2, "{quantum_rad}");
     }
 }
 
