@@ -79,6 +79,7 @@ fn join_intervals<'a>(segment: &Segment<'a>, longest_s: f64) -> (Segment<'a>, Ve
                 last.chord_area_rad2 += interval.chord_area_rad2 + 0.5 * (a.right * b.left - a.left * b.right);
                 last.wheel_rad = last.wheel_rad.zip_with(interval.wheel_rad, |last, rad| last + rad);
                 last.late_s[1] = interval.late_s[1];
+                last.interpolated_rad2[1] = interval.interpolated_rad2[1];
             }
             _ => joined.push(*interval),
         }

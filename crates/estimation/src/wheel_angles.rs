@@ -231,18 +231,28 @@ impl<'a> WheelAngleInterpolator<'a> {
         )
     }
 
-    /// How the wheels speed up from the row before to a row, and from it to the next, rad/s²; `None` where
-    /// single rows do not say their rates, and at the ends of the log.
+    /// How the wheels speed up into a row and out of it, rad/s²: from the middle of the row before to its own
+    /// and on to that of the next, or, where single rows do not say their rates, around its start and its end
+    /// by the rates there. `None` at the ends of the log.
     fn accelerations_around(&self, row: usize) -> Option<[Wheels<f64>; 2]> {
-        if !self.rates.window.row_by_row || row == 0 || row + 2 >= self.t_s.len() {
+        if row == 0 || row + 2 >= self.t_s.len() {
             return None;
         }
-        let middle_s = |row: usize| 0.5 * (self.t_s[row] + self.t_s[row + 1]);
-        let by = |from: usize, to: usize| {
-            let passed_s = middle_s(to) - middle_s(from);
-            self.row_rate(to).zip_with(self.row_rate(from), |to, from| (to - from) / passed_s)
+        let gained = |from: Wheels<f64>, to: Wheels<f64>, passed_s: f64| {
+            to.zip_with(from, |to, from| if passed_s > 0.0 { (to - from) / passed_s } else { 0.0 })
         };
-        Some([by(row - 1, row), by(row, row + 1)])
+        if self.rates.window.row_by_row {
+            let middle_s = |row: usize| 0.5 * (self.t_s[row] + self.t_s[row + 1]);
+            let by = |from: usize, to: usize| {
+                gained(self.row_rate(from), self.row_rate(to), middle_s(to) - middle_s(from))
+            };
+            return Some([by(row - 1, row), by(row, row + 1)]);
+        }
+        let around = |row: usize| {
+            let (before, after) = (row - 1, row + 1);
+            gained(self.rates.at_row(before), self.rates.at_row(after), self.t_s[after] - self.t_s[before])
+        };
+        Some([around(row), around(row + 1)])
     }
 
     /// Variances of the wheels' turns at an instant of a row's interval, rad²: an acceleration that is off

@@ -6,6 +6,7 @@ use super::*;
 use crate::FitSettings;
 use crate::NormalEquations;
 use crate::decimation::Decimated;
+use crate::segment::Segment;
 
 #[test]
 fn thinned_measurements_are_far_enough_apart_and_end_with_the_last() {
@@ -180,18 +181,20 @@ fn a_fit_of_every_measurement_is_thinned_to_the_bits_of_one_that_thins_from_the_
     assert!(every.extended(&mut [Box::new(TravelTerm)]).expect("a fit").thinned_further().is_none());
 }
 
-/// The same drive, logged several times as often.
+/// Nearly the same drive, logged several times as often, by angles that are no multiples of anything: rows say
+/// their rates, and within each second the wheels turn evenly.
 fn logged_finer(dataset: &Dataset, times: usize) -> Dataset {
     let mut finer = dataset.clone();
     for run in &mut finer.runs {
         let WheelLog::Angles(angles) = &run.odometry.wheels else { unreachable!("the helper logs angles") };
+        let off_grid = |of: &[f64]| of.iter().map(|at| at + 1e-2 * at.sin()).collect::<Vec<_>>();
         let between = |of: &[f64]| -> Vec<f64> {
             let steps = of.windows(2).flat_map(|pair| {
                 (0..times).map(|part| pair[0] + (pair[1] - pair[0]) * part as f64 / times as f64).collect::<Vec<_>>()
             });
             steps.chain(of.last().copied()).collect()
         };
-        let (t_s, angles) = (between(&run.odometry.t_s), angles.as_ref().map(|of| between(of)));
+        let (t_s, angles) = (between(&run.odometry.t_s), angles.as_ref().map(|of| between(&off_grid(of))));
         (run.odometry.t_s, run.odometry.wheels) = (t_s, WheelLog::Angles(angles));
     }
     finer
@@ -246,4 +249,25 @@ fn decimated_rows_of_one_speed_give_what_single_rows_give() {
     fit.solution.model.term_values = vec![0.01];
     fit.solution.pass = fit.scan(&mut by_rows);
     assert!(fit.decimated(&mut by_rows, 0.5).is_none());
+}
+
+#[test]
+fn joined_rows_end_as_uncertain_within_a_row_as_the_last_of_them() {
+    let mut finer = logged_finer(&dataset(true), 10);
+    for run in &mut finer.runs {
+        run.truth.iter_mut().for_each(|sample| sample.t_s = (sample.t_s + 0.03).min(11.97));
+    }
+    let session = [finer.session()];
+    let fit = ModelFit::from_parameters(MODEL, NOISE, &session);
+    let coarse = Decimated::of(&fit.records, &fit.selections, 0.5).expect("fewer").records;
+    let at_measurements = |records: &Records<'_>| {
+        let of_segment = |segment: &Segment<'_>| {
+            let ends = segment.measurements.iter().map(|measurement| measurement.after).filter(|after| *after > 0);
+            ends.map(|after| segment.intervals[after - 1].interpolated_rad2[1]).collect::<Vec<_>>()
+        };
+        records.segments.iter().map(of_segment).collect::<Vec<_>>()
+    };
+    let single = at_measurements(&fit.records);
+    assert!(single.iter().flatten().any(|variance| variance.left > 0.0));
+    assert_eq!(at_measurements(&coarse), single);
 }
