@@ -41,6 +41,7 @@ mod nested_gain;
 mod noise_effects;
 mod null_distribution;
 mod outlier_attribution;
+mod part_of_runs;
 mod physical;
 mod plan;
 mod pose_windows;

@@ -14,6 +14,7 @@ use crate::check::{Check, TestResult};
 use crate::finding;
 use crate::fit_cache::FitCache;
 use crate::model_comparison::{log_bayes_factor, margin_over_units, odds_within};
+use crate::part_of_runs::part_of_runs;
 use crate::record_faults::sessions;
 use crate::residual_tests::{Checked, check};
 use crate::selection::{SearchResult, search, search_ungated};
@@ -87,6 +88,84 @@ pub(crate) fn mean_structure<'a>(
     base: ModelFit<'a>,
     catalogue: &[Candidate],
 ) -> MeanStructure<'a> {
+    let by_part = autocorrelation_by_part(datasets, &base, catalogue);
+    let MeanSearch { base, model, correlated, spurious } = match by_part {
+        Some(autocorrelation) => {
+            let whole = base.clone().without_innovations(); // most of its memory
+            match Thinned::of(datasets, base, autocorrelation) {
+                Some(thinned) => thinned.search(catalogue),
+                None => search_and_thin(datasets, whole.with_innovations(&mut []).into_owned(), catalogue),
+            }
+        }
+        None => search_and_thin(datasets, base, catalogue),
+    };
+    let model = search_if_dependent(&base, model, catalogue);
+    let model = terms_if_dependent(&base, model);
+    let MeanModel { found, unlisted, checked, competing } = model;
+    MeanStructure { base, found, checked, unlisted, correlated, spurious, competing }
+}
+
+/// A base fit and the model found beside it, thinned if need be; `correlated` and `spurious` as in
+/// [`MeanStructure`].
+struct MeanSearch<'a> {
+    base: ModelFit<'a>,
+    model: MeanModel<'a>,
+    correlated: Option<(f64, f64)>,
+    spurious: bool,
+}
+
+/// A search among all measurements, and another one among thinned ones where the residuals stay autocorrelated.
+fn search_and_thin<'a>(datasets: &'a [Dataset], base: ModelFit<'a>, catalogue: &[Candidate]) -> MeanSearch<'a> {
+    let AmongAll { base, model, autocorrelation } = search_among_all(base, catalogue);
+    let spurious = autocorrelation.as_ref().is_some_and(|of| of.spurious);
+    match autocorrelation.filter(|of| of.lasts).and_then(|of| Thinned::of(datasets, base.clone(), of)) {
+        Some(thinned) => {
+            drop((base, model)); // their fits are large
+            thinned.search(catalogue)
+        }
+        None => MeanSearch { base, model, correlated: None, spurious },
+    }
+}
+
+/// A base fit of thinned measurements, and why they are thinned.
+struct Thinned<'a> {
+    base: ModelFit<'a>,
+    autocorrelation: Autocorrelation,
+}
+
+impl<'a> Thinned<'a> {
+    fn of(datasets: &'a [Dataset], base: ModelFit<'a>, autocorrelation: Autocorrelation) -> Option<Self> {
+        let base = base.thinned_further().unwrap_or_else(|| THINNED.fit(&sessions(datasets))).ok()?;
+        Some(Self { base, autocorrelation })
+    }
+
+    fn search(self, catalogue: &[Candidate]) -> MeanSearch<'a> {
+        let Autocorrelation { correlation, spurious, .. } = self.autocorrelation;
+        let (base, model) = search_beside_timing_noise(self.base, catalogue);
+        let model = compare_with_sparse(&base, model);
+        MeanSearch { base, model, correlated: Some(correlation), spurious }
+    }
+}
+
+/// What was found among all measurements, and what is left of their autocorrelation.
+struct AmongAll<'a> {
+    base: ModelFit<'a>,
+    model: MeanModel<'a>,
+    autocorrelation: Option<Autocorrelation>,
+}
+
+/// Residuals that were autocorrelated beside the effects found among all measurements.
+struct Autocorrelation {
+    /// Coefficient, and standard errors.
+    correlation: (f64, f64),
+    /// As in [`MeanStructure`].
+    spurious: bool,
+    /// No sparse terms explain it.
+    lasts: bool,
+}
+
+/// The search before measurements are thinned.
+fn search_among_all<'a>(base: ModelFit<'a>, catalogue: &[Candidate]) -> AmongAll<'a> {
     let (base, model) = search_beside_timing_noise(base, catalogue);
     // A large effect in few measurements looks like outliers: what a search among all measurements finds.
     let open = if model.has_outliers() { base.refit_ungated().ok() } else { None };
@@ -100,12 +179,31 @@ pub(crate) fn mean_structure<'a>(
         None => model,
     };
     let model = compare_with_sparse(&base, model);
-    let Decorrelated { base, model, correlated, spurious } = thin_if_autocorrelated(datasets, base, model, catalogue);
-    let model = if correlated.is_some() { compare_with_sparse(&base, model) } else { model };
-    let model = search_if_dependent(&base, model, catalogue);
-    let model = terms_if_dependent(&base, model);
-    let MeanModel { found, unlisted, checked, competing } = model;
-    MeanStructure { base, found, checked, unlisted, correlated, spurious, competing }
+    explain_autocorrelation(base, model)
+}
+
+/// What lasts of the measurements' autocorrelation, as far as a part of the runs tells: it says which effects
+/// stand beside an autocorrelation that no sparse terms explain, and all measurements how large that is beside
+/// these effects. `None` where the part does not say so, or all do not agree: what is sought among all is
+/// needed then.
+fn autocorrelation_by_part(
+    datasets: &[Dataset],
+    base: &ModelFit<'_>,
+    catalogue: &[Candidate],
+) -> Option<Autocorrelation> {
+    let part = part_of_runs(datasets, base)?;
+    if is_white(&check(&AugmentedModel::base(base))) {
+        return None;
+    }
+    let part = search_among_all(FitSettings::GEOMETRY_ONLY.fit(&part).ok()?, catalogue);
+    let of_part = part.autocorrelation.filter(|of| of.lasts)?;
+    let AugmentedModel { fit, candidates } = part.model.found.model;
+    let fit = match &candidates[..] {
+        [] => base.clone(),
+        candidates => base.extended_from(fit.solution.model.term_values, &mut terms(candidates)).ok()?,
+    };
+    let checked = check(&AugmentedModel { fit, candidates });
+    (!is_white(&checked)).then_some(Autocorrelation { correlation: checked.correlation, ..of_part })
 }
 
 /// The effects beside a base fit. Where instants are noisy beside them, the base fit with that noise, and the
@@ -162,40 +260,22 @@ fn compare_with_sparse<'a>(base: &ModelFit<'a>, model: MeanModel<'a>) -> MeanMod
     }
 }
 
-/// The base and the model after autocorrelation of the measurements is dealt with.
-struct Decorrelated<'a> {
-    base: ModelFit<'a>,
-    model: MeanModel<'a>,
-    /// As in [`MeanStructure`].
-    correlated: Option<(f64, f64)>,
-    spurious: bool,
-}
-
-/// Where residuals are autocorrelated: sparse terms if they explain that; else thinned measurements, and a
-/// new search on them. Autocorrelated measurements taken as independent make any effect too significant.
-fn thin_if_autocorrelated<'a>(
-    datasets: &'a [Dataset],
-    base: ModelFit<'a>,
-    model: MeanModel<'a>,
-    catalogue: &[Candidate],
-) -> Decorrelated<'a> {
+/// Where residuals are autocorrelated: sparse terms if they explain that. Autocorrelated measurements taken as
+/// independent make any effect too significant.
+fn explain_autocorrelation<'a>(base: ModelFit<'a>, model: MeanModel<'a>) -> AmongAll<'a> {
     if model.unlisted.is_some() || is_white(&model.checked) {
-        return Decorrelated { base, model, correlated: None, spurious: false };
+        return AmongAll { base, model, autocorrelation: None };
     }
+    let correlation = model.checked.correlation;
     let tried = sparse(&base, &model.found.model, SPARSE_TERM_LEVEL).map(|sparse| (check(&sparse.model), sparse));
     let spurious = tried.as_ref().is_some_and(|(_, sparse)| sparse.certain && sparse.drifts_more);
     let explains = tried.filter(|(checked, sparse)| is_white(checked) || (sparse.certain && !sparse.drifts_more));
-    if let Some((_, sparse)) = explains {
-        let model = model.with_terms(UncataloguedTerms::from(&base, sparse));
-        return Decorrelated { base, model, correlated: None, spurious };
-    }
-    let Ok(thinned) = base.thinned_further().unwrap_or_else(|| THINNED.fit(&sessions(datasets))) else {
-        return Decorrelated { base, model, correlated: None, spurious };
+    let lasts = explains.is_none();
+    let model = match explains {
+        Some((_, sparse)) => model.with_terms(UncataloguedTerms::from(&base, sparse)),
+        None => model,
     };
-    let correlated = Some(model.checked.correlation);
-    drop((base, model)); // their fits are large
-    let (base, model) = search_beside_timing_noise(thinned, catalogue);
-    Decorrelated { base, model, correlated, spurious }
+    AmongAll { base, model, autocorrelation: Some(Autocorrelation { correlation, spurious, lasts }) }
 }
 
 /// Where residuals depend on something recorded: a search at a higher level of false positives, if it finds

@@ -135,7 +135,7 @@ impl ModelFit<'_> {
         self.refit_by(&self.fit_options(), from, terms)
     }
 
-    fn refit_by(
+    pub(crate) fn refit_by(
         &mut self,
         options: &FitOptions,
         from: Option<InitialValues>,
@@ -147,7 +147,7 @@ impl ModelFit<'_> {
         Ok(())
     }
 
-    fn fit_options(&self) -> FitOptions {
+    pub(crate) fn fit_options(&self) -> FitOptions {
         let Self { ends, ungated, .. } = *self;
         FitOptions { fixed: self.fixed(), ends, ungated, ..FitOptions::of(&self.columns) }
     }

@@ -9,6 +9,7 @@ use model_term::ModelTerm;
 use crate::error::EstimationError;
 use crate::model::Column;
 use crate::model_fit::ModelFit;
+use crate::optimizer::{ConvergenceCriterion, FitOptions};
 use crate::records::Records;
 use crate::settings::{MIN_MEASUREMENTS_PER_RUN, SPACING_SLACK, THINNING_FACTOR, THINNING_PHASES};
 use crate::thinning::{Selection, Thinning};
@@ -18,13 +19,25 @@ impl ModelFit<'_> {
     pub(crate) fn thin(&mut self) -> Result<(), EstimationError> {
         let Some(between_s) = median_between(&self.records) else { return Ok(()) };
         let mut every_s = between_s;
-        while !self.is_white() {
-            every_s *= THINNING_FACTOR;
-            let Some((thinning, selections)) = self.thinned(every_s, between_s) else { break };
-            (self.selections, self.thinning) = (Arc::new(selections), thinning);
-            self.refit(Some(self.current_values()), &mut [])?;
+        // How autocorrelated innovations are depends on no last digit of a fit.
+        let compared = FitOptions { ends: ConvergenceCriterion::Likelihood, ..self.fit_options() };
+        let mut has_converged = true;
+        loop {
+            let wider = if self.is_white() { None } else { self.thinned(THINNING_FACTOR * every_s, between_s) };
+            if wider.is_none() && has_converged {
+                return Ok(());
+            }
+            self.solution.pass.innovations = Arc::default(); // most of the memory
+            has_converged = wider.is_none();
+            match wider {
+                Some((thinning, selections)) => {
+                    every_s *= THINNING_FACTOR;
+                    (self.selections, self.thinning) = (Arc::new(selections), thinning);
+                    self.refit_by(&compared, Some(self.current_values()), &mut [])?;
+                }
+                None => self.refit(Some(self.current_values()), &mut [])?,
+            }
         }
-        Ok(())
     }
 
     /// The fit of the same sessions that thins poses and displacements, and estimates no nuisances. A fit by
@@ -33,7 +46,7 @@ impl ModelFit<'_> {
     ///
     /// # Errors
     /// [`EstimationError`] when it diverges.
-    pub fn thinned_further(&self) -> Option<Result<Self, EstimationError>> {
+    pub fn thinned_further(self) -> Option<Result<Self, EstimationError>> {
         let is_first_step = self.thinning == Thinning::NONE
             && !self.ungated
             && self.prior.timing_s2 == 0.0
@@ -41,7 +54,7 @@ impl ModelFit<'_> {
             && !self.columns.iter().any(|column| matches!(column, Column::Term(_)))
             && !self.solution.pass.innovations.is_empty();
         is_first_step.then(|| {
-            let mut thinned = Self { displacements_in_series: true, ..self.clone() };
+            let mut thinned = Self { displacements_in_series: true, ..self };
             thinned.thin()?;
             thinned.fix_unobservable()?;
             Ok(thinned)

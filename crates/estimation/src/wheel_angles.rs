@@ -243,9 +243,8 @@ impl<'a> WheelAngleInterpolator<'a> {
         };
         if self.rates.window.row_by_row {
             let middle_s = |row: usize| 0.5 * (self.t_s[row] + self.t_s[row + 1]);
-            let by = |from: usize, to: usize| {
-                gained(self.row_rate(from), self.row_rate(to), middle_s(to) - middle_s(from))
-            };
+            let by =
+                |from: usize, to: usize| gained(self.row_rate(from), self.row_rate(to), middle_s(to) - middle_s(from));
             return Some([by(row - 1, row), by(row, row + 1)]);
         }
         let around = |row: usize| {

@@ -8,6 +8,20 @@ pub(crate) const MIN_AUTOCORRELATION: f64 = 0.05;
 /// Tuned: by hand; no record of what on.
 pub(crate) const AUTOCORRELATION_SIGMAS: f64 = 4.0;
 
+/// Measurements in a part of many runs that says whether all have to be thinned.
+/// Budgeted: a part costs an eighth of a search among the 133,000 measurements of 102 runs; its autocorrelation is
+/// certain to a hundredth (1/√16384).
+pub(crate) const MEASUREMENTS_OF_PART: f64 = 16_384.0;
+
+/// Share of all measurements. A larger part saves little where it says that measurements have to be thinned,
+/// and costs its share where not.
+/// Budgeted: a third more time at the most.
+pub(crate) const MAX_SHARE_OF_PART: f64 = 1.0 / 3.0;
+
+/// Runs of a part. Fewer do not have all kinds of paths, nor do intervals over runs hold.
+/// Tuned: by hand; sandwich intervals are asked of six runs.
+pub(crate) const MIN_RUNS_OF_PART: f64 = 6.0;
+
 /// Probability. Family-wise false-positive rate of the scan where residuals depend on something recorded.
 /// Tuned: by hand; no record of what on.
 pub(crate) const SCAN_LEVEL_IF_DEPENDENT: f64 = 0.2;

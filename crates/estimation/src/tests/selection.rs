@@ -170,13 +170,13 @@ fn a_fit_of_every_measurement_is_thinned_to_the_bits_of_one_that_thins_from_the_
     let every = FitSettings::GEOMETRY_ONLY.fit(&[dataset.session()]).expect("a fit");
     let whole = FitSettings { thin: true, thin_displacements: true, ..FitSettings::GEOMETRY_ONLY };
     let whole = whole.fit(&[dataset.session()]).expect("a fit");
-    let further = every.thinned_further().expect("a first step").expect("a fit");
+    let further = every.clone().thinned_further().expect("a first step").expect("a fit");
     assert!(further.thinning != Thinning::NONE && further.thinning == whole.thinning);
     assert_eq!(further.solution.model, whole.solution.model);
     assert_eq!(further.solution.noise, whole.solution.noise);
     assert_eq!(further.solution.pass.runs, whole.solution.pass.runs);
     // Fits that have gone on are no first step.
-    assert!(further.thinned_further().is_none());
+    assert!(further.clone().thinned_further().is_none());
     assert!(every.refit_ungated().expect("a fit").thinned_further().is_none());
     assert!(every.extended(&mut [Box::new(TravelTerm)]).expect("a fit").thinned_further().is_none());
 }
