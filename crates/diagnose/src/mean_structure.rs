@@ -114,7 +114,8 @@ struct MeanSearch<'a> {
     spurious: bool,
 }
 
-/// A search among all measurements, and another one among thinned ones where the residuals stay autocorrelated.
+/// A search among all measurements, and another one among thinned ones where the residuals stay
+/// autocorrelated.
 fn search_and_thin<'a>(datasets: &'a [Dataset], base: ModelFit<'a>, catalogue: &[Candidate]) -> MeanSearch<'a> {
     let AmongAll { base, model, autocorrelation } = search_among_all(base, catalogue);
     let spurious = autocorrelation.as_ref().is_some_and(|of| of.spurious);
@@ -183,9 +184,9 @@ fn search_among_all<'a>(base: ModelFit<'a>, catalogue: &[Candidate]) -> AmongAll
 }
 
 /// What lasts of the measurements' autocorrelation, as far as a part of the runs tells: it says which effects
-/// stand beside an autocorrelation that no sparse terms explain, and all measurements how large that is beside
-/// these effects. `None` where the part does not say so, or all do not agree: what is sought among all is
-/// needed then.
+/// stand beside an autocorrelation that no sparse terms explain, and all measurements how large that is
+/// beside these effects. `None` where the part does not say so, or all do not agree: what is sought among all
+/// is needed then.
 fn autocorrelation_by_part(
     datasets: &[Dataset],
     base: &ModelFit<'_>,
@@ -260,8 +261,8 @@ fn compare_with_sparse<'a>(base: &ModelFit<'a>, model: MeanModel<'a>) -> MeanMod
     }
 }
 
-/// Where residuals are autocorrelated: sparse terms if they explain that. Autocorrelated measurements taken as
-/// independent make any effect too significant.
+/// Where residuals are autocorrelated: sparse terms if they explain that. Autocorrelated measurements taken
+/// as independent make any effect too significant.
 fn explain_autocorrelation<'a>(base: ModelFit<'a>, model: MeanModel<'a>) -> AmongAll<'a> {
     if model.unlisted.is_some() || is_white(&model.checked) {
         return AmongAll { base, model, autocorrelation: None };

@@ -5,8 +5,8 @@ use estimation::{ModelFit, Thinning};
 
 use crate::settings::search::{MAX_SHARE_OF_PART, MEASUREMENTS_OF_PART, MIN_RUNS_OF_PART};
 
-/// Runs of every kind with [`MEASUREMENTS_OF_PART`] measurements; `None` where that is no small part of what a
-/// fit of all measurements has.
+/// Runs of every kind with [`MEASUREMENTS_OF_PART`] measurements; `None` where that is no small part of what
+/// a fit of all measurements has.
 pub(crate) fn part_of_runs<'a>(datasets: &'a [Dataset], base: &ModelFit<'_>) -> Option<Vec<Session<'a>>> {
     let share = MEASUREMENTS_OF_PART / base.records.measurements().max(1) as f64;
     let runs: usize = datasets.iter().map(|dataset| dataset.runs.len()).sum();
@@ -46,7 +46,8 @@ mod tests {
             for (period, phase) in [(1, 0), (2, 0), (2, 1), (3, 0), (3, 2), (4, 1), (4, 3)] {
                 let own = in_part.iter().skip(phase).step_by(period).filter(|own| **own).count();
                 let even = share * 1200.0 / f64::from(u32::try_from(period).expect("small"));
-                // Discrepancies of such a sequence are below a few runs; every fifth run would be all of one kind.
+                // Discrepancies of such a sequence are below a few runs; every fifth run would be all of one
+                // kind.
                 assert!((own as f64 - even).abs() < 4.0, "{share}: {own} of every {period}th for {even}");
             }
         }

@@ -9,8 +9,8 @@ pub(crate) const MIN_AUTOCORRELATION: f64 = 0.05;
 pub(crate) const AUTOCORRELATION_SIGMAS: f64 = 4.0;
 
 /// Measurements in a part of many runs that says whether all have to be thinned.
-/// Budgeted: a part costs an eighth of a search among the 133,000 measurements of 102 runs; its autocorrelation is
-/// certain to a hundredth (1/√16384).
+/// Budgeted: a part costs an eighth of a search among the 133,000 measurements of 102 runs; its
+/// autocorrelation is certain to a hundredth (1/√16384).
 pub(crate) const MEASUREMENTS_OF_PART: f64 = 16_384.0;
 
 /// Share of all measurements. A larger part saves little where it says that measurements have to be thinned,

@@ -181,8 +181,8 @@ fn a_fit_of_every_measurement_is_thinned_to_the_bits_of_one_that_thins_from_the_
     assert!(every.extended(&mut [Box::new(TravelTerm)]).expect("a fit").thinned_further().is_none());
 }
 
-/// Nearly the same drive, logged several times as often, by angles that are no multiples of anything: rows say
-/// their rates, and within each second the wheels turn evenly.
+/// Nearly the same drive, logged several times as often, by angles that are no multiples of anything: rows
+/// say their rates, and within each second the wheels turn evenly.
 fn logged_finer(dataset: &Dataset, times: usize) -> Dataset {
     let mut finer = dataset.clone();
     for run in &mut finer.runs {
