@@ -52,10 +52,10 @@ def failed(message):
 
 
 class Tree:
-    """A clone of the last commit in which one crate is changed."""
+    """A clone of the last commit in which one crate is changed; `program` of tests/ is asked too, if there is one."""
 
-    def __init__(self, root, target, crate):
-        self.root, self.target, self.crate = root, target, crate
+    def __init__(self, root, target, crate, program):
+        self.target, self.crate, self.program = target, crate, program
         self.path = target / "tree"
         if not self.path.is_dir():
             run("git", "clone", "--quiet", "--shared", root, self.path)
@@ -97,11 +97,11 @@ class Tree:
         return [], errors or [{"spans": [], "message": built.stderr[-2000:], "rendered": built.stderr[-2000:]}]
 
     def programs(self):
-        """Both sets of test programs: the crate's own and that of tests/."""
+        """Both sets of test programs: the crate's own and that of tests/; or the compiler's errors."""
         own, errors = self.executables(self.crate, "--lib", "--tests")
-        if errors:
-            return None, errors
-        beside, errors = self.executables("yair", "--test", PROGRAM[self.crate])
+        beside = []
+        if self.program and not errors:
+            beside, errors = self.executables("yair", "--test", self.program)
         return (None, errors) if errors else ({"own": own, "program": beside}, [])
 
 
@@ -207,7 +207,8 @@ def behind_switch(tree, sample):
         programs, errors = tree.programs()
         if programs:
             return programs, sorted(alone)
-        found = set().union(*(blamed(tree, error, [item for of in files.values() for item in of]) for error in errors)) - alone
+        switched_on = [(number, mutant) for number, mutant in together.items() if number not in alone]
+        found = set().union(*(blamed(tree, error, switched_on) for error in errors)) - alone
         if not found:
             failed("what the compiler refuses comes from no change:\n" + "\n".join(error["rendered"] for error in errors[:3]))
         alone |= found
@@ -277,50 +278,47 @@ def main():
     os.environ.setdefault("YAIR_DATA", str(root.parent / "shared/data"))
     target = Path(os.environ.get("CARGO_TARGET_DIR", root / "target")).resolve() / "mutants"
     target.mkdir(parents=True, exist_ok=True)
-    tree = Tree(root, target, crate)
+    program = None if "own" in words else PROGRAM[crate]
+    tree = Tree(root, target, crate, program)
     sample = drawn(tree.mutants(), seed)
     results = target / f"{crate}-{seed}.json"
     before = json.loads(results.read_text()) if "again" in words and results.is_file() else {}
-    caught = {name: test for name, test in before.items() if test and test != "does not compile"}
+    outcome = {name: result for name, result in before.items() if result}
 
     programs, alone = behind_switch(tree, sample)
-    if "own" in words:
-        programs["program"] = []
     limits = limits_of(programs)
-    outcome = {}
 
-    def ask(number, name, programs):
-        if name in caught:
-            return caught[name]
+    def ask(number, programs):
         own = first_failure(programs["own"], number, limits)
         return f"own: {own}" if own else first_failure(programs["program"], number, limits)
 
-    for number, mutant in enumerate(sample, 1):
+    def note(number, name, result):
+        outcome[name] = result
+        print(f"{number}: {name}: {result or 'MISSED'}", flush=True)
+        results.write_text(json.dumps(outcome, indent=1))
+
+    left = [(number, mutant) for number, mutant in enumerate(sample, 1) if mutant["name"] not in outcome]
+    for number, mutant in left:
         if number not in alone:
-            outcome[mutant["name"]] = ask(number, mutant["name"], programs)
-            print(f"{number}: {mutant['name']}: {outcome[mutant['name']] or 'MISSED'}", flush=True)
-            results.write_text(json.dumps(outcome, indent=1))
-    for number in alone:
-        mutant = sample[number - 1]
+            note(number, mutant["name"], ask(number, programs))
+    for number, mutant in left:
+        if number not in alone:
+            continue
         tree.reset()
         file = tree.path / mutant["file"]
         file.write_text(changed(file.read_text(), mutant))
         single, errors = tree.programs()
         if errors:
-            outcome[mutant["name"]] = "does not compile"
-        else:
-            if "own" in words:
-                single["program"] = []
-            limits.update({executable: max(limits.values()) for tests in single.values() for executable, _ in tests})
-            outcome[mutant["name"]] = ask(0, mutant["name"], single)
-        print(f"{number}, alone: {mutant['name']}: {outcome[mutant['name']] or 'MISSED'}", flush=True)
-        results.write_text(json.dumps(outcome, indent=1))
+            note(number, mutant["name"], "does not compile")
+            continue
+        limits.update({executable: max(limits.values()) for tests in single.values() for executable, _ in tests})
+        note(number, mutant["name"], ask(0, single))
 
     compiled = {name: test for name, test in outcome.items() if test != "does not compile"}
     by_own = sum(1 for test in compiled.values() if test and test.startswith("own: "))
     print(f"its own tests: {share(by_own, len(compiled))}")
-    if "own" not in words:
-        print(f"and --test {PROGRAM[crate]}: {share(sum(1 for test in compiled.values() if test), len(compiled))}")
+    if program:
+        print(f"and --test {program}: {share(sum(1 for test in compiled.values() if test), len(compiled))}")
     print("\n".join(name for name, test in compiled.items() if not test))
 
 

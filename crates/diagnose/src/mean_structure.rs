@@ -193,17 +193,19 @@ fn autocorrelation_by_part(
     catalogue: &[Candidate],
 ) -> Option<Autocorrelation> {
     let part = part_of_runs(datasets, base)?;
-    if is_white(&check(&AugmentedModel::base(base))) {
+    let beside_none = check(&AugmentedModel::base(base));
+    if is_white(&beside_none) {
         return None;
     }
     let part = search_among_all(FitSettings::GEOMETRY_ONLY.fit(&part).ok()?, catalogue);
     let of_part = part.autocorrelation.filter(|of| of.lasts)?;
     let AugmentedModel { fit, candidates } = part.model.found.model;
-    let fit = match &candidates[..] {
-        [] => base.clone(),
-        candidates => base.extended_from(fit.solution.model.term_values, &mut terms(candidates)).ok()?,
+    let checked = if candidates.is_empty() {
+        beside_none
+    } else {
+        let fit = base.extended_from(fit.solution.model.term_values, &mut terms(&candidates)).ok()?;
+        check(&AugmentedModel { fit, candidates })
     };
-    let checked = check(&AugmentedModel { fit, candidates });
     (!is_white(&checked)).then_some(Autocorrelation { correlation: checked.correlation, ..of_part })
 }
 

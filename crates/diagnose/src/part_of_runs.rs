@@ -46,8 +46,7 @@ mod tests {
             for (period, phase) in [(1, 0), (2, 0), (2, 1), (3, 0), (3, 2), (4, 1), (4, 3)] {
                 let own = in_part.iter().skip(phase).step_by(period).filter(|own| **own).count();
                 let even = share * 1200.0 / f64::from(u32::try_from(period).expect("small"));
-                // Discrepancies of such a sequence are below a few runs; every fifth run would be all of one
-                // kind.
+                // The discrepancy of such a sequence grows with the logarithm of its length: a few runs here.
                 assert!((own as f64 - even).abs() < 4.0, "{share}: {own} of every {period}th for {even}");
             }
         }

@@ -216,7 +216,7 @@ impl<'a> WheelAngleInterpolator<'a> {
 
     /// How the wheels speed up steadily within a row, rad/s²: by the rates of the rows before and after,
     /// whichever says less, and not at all where they disagree, as at a jump of the speed (van Leer 1979).
-    /// 0 where single rows do not say their rates, and in rows so long that a robot does several things.
+    /// 0 at the ends of the log, and in rows so long that a robot does several things.
     fn acceleration_rad_s2(&self, row: usize) -> Wheels<f64> {
         let Some([before, after]) =
             self.accelerations_around(row).filter(|_| self.rates.are_joined_around(self.t_s, row))
