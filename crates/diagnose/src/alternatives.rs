@@ -73,6 +73,9 @@ impl Status {
             Self::Refused(Refusal::NotOverRuns) => "significant in a few runs alone, not over all of them",
             Self::Refused(Refusal::PredictsWorse) => "significant, but it predicts held-out runs worse",
             Self::Refused(Refusal::DriftsMore) => "significant, but odometry drifts more with it on held-out runs",
+            Self::Refused(Refusal::Cancels) => {
+                "significant only beside another effect that takes it back: together they are far less than each is"
+            }
             Self::NotSignificant => "not significant",
             Self::NotDetectable => "not detectable in these data",
             Self::NotResolved => NOT_RESOLVED,

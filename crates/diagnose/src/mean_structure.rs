@@ -270,9 +270,11 @@ fn explain_autocorrelation<'a>(base: ModelFit<'a>, model: MeanModel<'a>) -> Amon
         return AmongAll { base, model, autocorrelation: None };
     }
     let correlation = model.checked.correlation;
-    let tried = sparse(&base, &model.found.model, SPARSE_TERM_LEVEL).map(|sparse| (check(&sparse.model), sparse));
+    let best = SparseSearch::beside(SPARSE_TERM_LEVEL, &base, &model.found.model)
+        .and_then(|search| search.best_prediction(SPARSE_TERM_LEVEL));
+    let tried = best.map(|sparse| (check(&sparse.model), sparse));
     let spurious = tried.as_ref().is_some_and(|(_, sparse)| sparse.certain && sparse.drifts_more);
-    let explains = tried.filter(|(checked, sparse)| is_white(checked) || (sparse.certain && !sparse.drifts_more));
+    let explains = tried.filter(|(checked, sparse)| !sparse.drifts_more && (is_white(checked) || sparse.certain));
     let lasts = explains.is_none();
     let model = match explains {
         Some((_, sparse)) => model.with_terms(UncataloguedTerms::from(&base, sparse)),

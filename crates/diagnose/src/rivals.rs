@@ -35,6 +35,8 @@ pub enum Refusal {
     PredictsWorse,
     /// Held-out runs drift more with it.
     DriftsMore,
+    /// It and another one take each other back: each by itself would be a far larger error than both are.
+    Cancels,
 }
 
 /// The last refusal of each effect, by its id.

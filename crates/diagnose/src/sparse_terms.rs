@@ -48,7 +48,7 @@ impl<'a> UncataloguedTerms<'a> {
     pub(crate) fn from(base: &ModelFit<'a>, first: FoundTerm<'a>) -> Self {
         let mut all = Self { model: first.model, tried: vec![(first.p_value, first.trials)] };
         while all.tried.len() < MAX_SPARSE_TERMS
-            && let Some(next) = sparse(base, &all.model, SPARSE_TERM_LEVEL).filter(|next| !next.drifts_more)
+            && let Some(next) = sparse(base, &all.model, SPARSE_TERM_LEVEL)
         {
             all.model = next.model;
             all.tried.push((next.p_value, next.trials));
@@ -58,7 +58,7 @@ impl<'a> UncataloguedTerms<'a> {
 
     /// Terms that an ungated search finds: what is large in few measurements makes them outliers.
     pub(crate) fn ungated_terms((base, open): (&ModelFit<'a>, &ModelFit<'a>)) -> Option<Self> {
-        let first = sparse(open, &AugmentedModel::base(open), SPARSE_TERM_LEVEL).filter(|first| !first.drifts_more)?;
+        let first = sparse(open, &AugmentedModel::base(open), SPARSE_TERM_LEVEL)?;
         let all = Self::from(open, first);
         let log_trials = all.log_trials();
         Some(Self { model: regated(all.model, base, &AugmentedModel::base(base), log_trials)?, tried: all.tried })
@@ -196,27 +196,36 @@ impl<'m, 'a> SparseSearch<'m, 'a> {
         Some(Self { model, p_value, trials, refitted: refit_each(&scored[..MAX_SPARSE_REFITS.min(trials)], with) })
     }
 
-    /// The best of them that predicts held-out runs better, if the best is significant by its score.
+    /// The best of them that predicts held-out runs better, if the best is significant by its score, and
+    /// unless odometry drifts more with it.
     pub(crate) fn finding(&self, level: f64) -> Option<FoundTerm<'a>> {
+        self.best_prediction(level).filter(|term| !term.drifts_more)
+    }
+
+    /// The same, whether odometry drifts more with it or not.
+    pub(crate) fn best_prediction(&self, level: f64) -> Option<FoundTerm<'a>> {
         if self.p_value > level {
             return None;
         }
-        self.refitted
-            .iter()
-            .filter_map(|extended| {
-                let earned = gain(self.model, extended).ok()?;
-                let score = earned.log_score_per_observation;
-                let certain = score.low + score.high > 2.0 * (score.high - score.low);
-                (score.low > 0.0).then_some((score.extended, extended, certain, earned.drifts_more()))
-            })
-            .max_by(|a, b| a.0.total_cmp(&b.0))
-            .map(|(_, extended, certain, drifts_more)| FoundTerm {
-                model: extended.clone(),
-                p_value: self.p_value,
-                trials: self.trials,
-                certain,
-                drifts_more,
-            })
+        let predicting = self.refitted.iter().filter_map(|extended| {
+            let earned = gain(self.model, extended).ok()?;
+            let score = earned.log_score_per_observation;
+            let certain = score.low + score.high > 2.0 * (score.high - score.low);
+            (score.low > 0.0).then_some((score.extended, extended, certain, earned.drifts_more()))
+        });
+        let (_, extended, certain, drifts_more) = predicting.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        // What is no more than the error of a larger effect's form is none beside it.
+        let (test, _) = wald_test(extended, self.model.candidates.len())?;
+        // As many parameters as observations leave no scatter, and a size without one is not determined.
+        let is_determined = test.estimates.iter().all(|(_, sigma)| sigma.is_finite());
+        let is_found = is_determined && test.statistic >= form_error_statistic(self.model);
+        is_found.then(|| FoundTerm {
+            model: extended.clone(),
+            p_value: self.p_value,
+            trials: self.trials,
+            certain,
+            drifts_more,
+        })
     }
 
     /// The likeliest of them.
@@ -267,10 +276,5 @@ fn deflate_best(null: &NullDistribution<'_, '_>, scored: &mut [Scored]) {
 
 /// The best sparse term beside a model.
 pub(crate) fn sparse<'a>(base: &ModelFit<'a>, model: &AugmentedModel<'a>, level: f64) -> Option<FoundTerm<'a>> {
-    let found = SparseSearch::beside(level, base, model)?.finding(level)?;
-    // What is no more than the error of a larger effect's form is none beside it.
-    let (test, _) = wald_test(&found.model, found.model.candidates.len().checked_sub(1)?)?;
-    // As many parameters as observations leave no scatter, and a size without one is not determined.
-    let is_determined = test.estimates.iter().all(|(_, sigma)| sigma.is_finite());
-    (is_determined && test.statistic >= form_error_statistic(model)).then_some(found)
+    SparseSearch::beside(level, base, model)?.finding(level)
 }
