@@ -21,7 +21,7 @@ import threading
 import time
 from pathlib import Path
 
-PROGRAM = {"kinematics": "methods", "estimation": "methods", "calib": "methods", "diagnose": "diagnosis"}
+PROGRAM = {"kinematics": "methods", "estimation": "methods", "calib": "methods", "diagnose": "diagnosis_numbers"}
 # So many are drawn that 80 compile in every crate.
 DRAWN = 100
 # Asks for memory ahead of time, and changes no result.
