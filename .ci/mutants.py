@@ -157,8 +157,9 @@ def switched(text, mutants):
         head, body = text[start:body_at], text[body_at:end]
         # Arms have one type: an iterator of a type that is not named becomes a boxed one.
         before = behind = ""
-        if hidden := re.search(r"->\s*impl (Iterator<Item = .*>)( \+ '_)?\s*$", head):
-            boxed = f"Box<dyn {hidden[1]}{' + ' + chr(39) + '_' if '&' in head[: hidden.start()] else ''}>"
+        if hidden := re.search(r"->\s*impl (Iterator<Item = .*>)( \+ '\w+)?\s*$", head):
+            borrowed = " + '_" if "&" in head[: hidden.start()] else ""
+            boxed = f"Box<dyn {hidden[1]}{hidden[2] or borrowed}>"
             head = f"{head[: hidden.start()]}-> {boxed} "
             before, behind = f"{{ let boxed: {boxed} = Box::new(", "); boxed }"
         arms = []
