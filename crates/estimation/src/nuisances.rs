@@ -276,6 +276,22 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_robot_that_stands_hides_its_geometry() {
+        let driven = crate::tests::dataset_of(2, true);
+        let mut standing = driven.clone();
+        for run in &mut standing.runs {
+            let rows = run.odometry.t_s.len();
+            run.odometry.wheels = dataset::WheelLog::Angles(kinematics::Wheels::both(vec![0.0; rows]));
+        }
+        let of = |dataset: &dataset::Dataset| {
+            let mut fit = ModelFit::from_parameters(crate::tests::MODEL, crate::tests::NOISE, &[dataset.session()]);
+            fit.solution.pass = fit.scan(&mut []);
+            hidden_directions(&fit)
+        };
+        assert_eq!((of(&driven), of(&standing)), (0, 3));
+    }
+
+    #[test]
     fn a_mean_has_its_standard_error_from_two_values_on() {
         // Of 1 to 4: squares of 2.25 + 0.25 + 0.25 + 2.25 over three, and over four values.
         let (mean, error) = mean_and_error(&[1.0, 2.0, 3.0, 4.0]).expect("four");

@@ -187,6 +187,11 @@ mod tests {
         sparse.runs[0].odometry.t_s = vec![0.0, 2.0];
         let refused = Tachometer.calibrate(&[sparse.session()]).expect_err("no rows inside").to_string();
         assert!(refused.contains("too far apart"), "{refused}");
+        // On a clock that began long ago. Rejects a gap that is measured against instants, not intervals.
+        let mut late = sparse.clone();
+        late.runs[0].odometry.t_s.iter_mut().for_each(|t_s| *t_s += 1e3);
+        late.runs[0].wheel_reference.iter_mut().for_each(|sample| sample.t_s += 1e3);
+        assert_eq!(Tachometer.calibrate(&[late.session()]).expect_err("no rows inside").to_string(), refused);
         sparse.runs[0].wheel_reference.clear();
         let refused = Tachometer.calibrate(&[sparse.session()]).expect_err("no reference").to_string();
         assert!(refused.contains("wheel_reference.csv"), "{refused}");

@@ -245,3 +245,18 @@ fn the_distance_between_measurements_is_the_mean_of_both_wheels() {
     let motions = records.measurements() as f64;
     assert!((found / (2.0 * distance_m() / motions) - 1.0).abs() < 1e-12, "{found} {motions}");
 }
+
+#[test]
+fn a_wheel_changes_its_speed_before_the_measurement_that_sees_it() {
+    // Rows every second, measurements every two: the left wheel is twice as fast from 9 s on.
+    let mut dataset = dataset_of(1, true);
+    let angle = |rate: f64| (0..=12).map(|k| f64::from(k) + rate * f64::from((k - 9).max(0))).collect::<Vec<f64>>();
+    dataset.runs[0].odometry.wheels = WheelLog::Angles(Wheels { left: angle(1.0), right: angle(0.0) });
+    let changes = |dataset: &Dataset| Records::of(&[dataset.session()]).segments[0].changes_of_speed();
+    let only_the_fifth = [false, false, false, false, true, false];
+    let found = changes(&dataset);
+    assert_eq!(found[found.len() - 6..], only_the_fifth, "{found:?}");
+    // A change by less than a fifth of the fastest speed is none.
+    dataset.runs[0].odometry.wheels = WheelLog::Angles(Wheels { left: angle(0.2), right: angle(0.0) });
+    assert!(changes(&dataset).iter().all(|change| !change));
+}

@@ -34,3 +34,26 @@ fn scores_of_runs_and_their_variances_sum_to_those_of_all_runs() {
         assert!(projected.share.iter().all(|share| *share < 0.99), "{:?}", projected.share);
     }
 }
+
+#[test]
+fn a_scan_has_samples_where_they_are_asked_for_and_nothing_of_columns_that_are_not_free() {
+    let dataset = dataset_of(3, true);
+    let mut fit = ModelFit::from_parameters(MODEL, NOISE, &[dataset.session()]);
+    let samples = fit.scan_with_samples(&mut []).samples;
+    let count = |phases: Vec<usize>| phases.into_iter().sum::<usize>();
+    let innovations = fit.scan(&mut []).innovations.iter().map(|phase| phase.len()).collect();
+    // Of three components.
+    assert_eq!(3 * count(samples.iter().map(Vec::len).collect()), count(innovations));
+    assert!(samples.iter().any(|phase| !phase.is_empty()));
+    assert!(fit.scan(&mut []).samples.iter().all(Vec::is_empty));
+
+    fit.columns = Column::GEOMETRY.to_vec();
+    let all = total(&fit.scan(&mut [Box::new(TravelTerm)]).runs).expect("runs");
+    let parts = total(&fit.scan_parts(&mut [Box::new(TravelTerm)], &[2])).expect("runs");
+    let (free, other) = (Column::Separation.index(), Column::SensorY.index());
+    assert!(all.information[(free, other)] != 0.0 && all.information[(other, other)] > 0.0);
+    assert_eq!((parts.information[(free, other)], parts.information[(other, other)]), (0.0, 0.0));
+    let near = (parts.information[(free, free)] / all.information[(free, free)] - 1.0).abs();
+    // Sums of hundreds of roundings.
+    assert!(near < 1e-12, "{near}");
+}
