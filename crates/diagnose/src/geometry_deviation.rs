@@ -25,3 +25,16 @@ impl GeometryDeviation {
         self.of == GeometryRatio::Separation && (1.0..=MAX_SKID_STEERED_SEPARATION).contains(&self.ratio)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_robot_that_skids_in_turns_has_a_wider_separation_and_nothing_else() {
+        let is = |of, ratio| GeometryDeviation { of, ratio, sigma: 0.01 }.is_of_skid_steering();
+        assert!(is(GeometryRatio::Separation, 1.3));
+        assert!(!is(GeometryRatio::Separation, 0.8) && !is(GeometryRatio::Separation, 50.0));
+        assert!(!is(GeometryRatio::Wheels, 1.3) && !is(GeometryRatio::RightOverLeft, 1.3));
+    }
+}

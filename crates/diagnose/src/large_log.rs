@@ -197,6 +197,29 @@ mod tests {
     use super::*;
 
     #[test]
+    fn measurements_of_all_kinds_count() {
+        use dataset::{HeadingReading, TapeDistance, TruthSample, WallReading, WheelSpeed};
+        let wall = WallReading {
+            t_s: 0.0,
+            wall: "w".to_owned(),
+            distance_m: None,
+            heading_rad: None,
+            sigma_m: None,
+            sigma_rad: None,
+        };
+        let run = Run {
+            truth: vec![TruthSample::new(0.0, 0.0, 0.0, None); 100],
+            headings: vec![HeadingReading { t_s: 0.0, theta_rad: 0.0, sigma_rad: 1.0 }; 20],
+            wheel_reference: vec![WheelSpeed { t_s: 0.0, speed_m_s: kinematics::Wheels::both(0.0) }; 7],
+            distances: vec![TapeDistance { t0_s: 0.0, t1_s: 1.0, distance_m: 1.0, sigma_m: 1.0 }; 3],
+            walls: vec![wall; 2000],
+            ..Run::default()
+        };
+        // Rejects a kind that is left out, or taken off.
+        assert_eq!((measured(&run), measured(&Run::default())), (2130, 0));
+    }
+
+    #[test]
     fn places_are_spread_over_all_and_meet_nothing_that_recurs_at_one_phase() {
         assert_eq!(spread(0, 1), [0; 0]);
         assert_eq!(spread(5, 5), [0, 1, 2, 3, 4]);
