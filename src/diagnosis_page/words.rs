@@ -59,11 +59,12 @@ pub(crate) fn gain(document: &Document) -> Option<String> {
     })
 }
 
-/// An interval of the gain that contains zero, per cent of the drift.
+/// An interval of the gain that contains zero, per cent of the drift. A normal interval may reach beyond all
+/// of the drift, of which nothing can be removed.
 pub(crate) fn undecided(low_percent: f64, high_percent: f64) -> String {
     format!(
         "with the correction it may be anything from {:.0} % less to {:.0} % more (95 %)",
-        high_percent.max(0.0),
+        high_percent.clamp(0.0, 100.0),
         (-low_percent).max(0.0)
     )
 }

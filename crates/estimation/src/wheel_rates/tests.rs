@@ -37,9 +37,9 @@ fn a_rate_does_not_have_its_own_rows_rounding() {
 
 #[test]
 fn windows_grow_with_the_rounding_until_it_is_below_a_tenth_of_the_signal() {
-    // Over h rows before and after, 10 ms each, a rate's noise is q²/12 over h(h + 1)(2h + 1)/3 · 10⁻⁴ s². For
-    // 0.02 rad that is 0.033 and 0.012 rad²/s² of two and three rows, for 0.05 rad 0.035 and 0.011 of four and
-    // six: the limit below lies between.
+    // Over h rows before and after, 10 ms each, a rate's noise is q²/12 over h(h + 1)(2h + 1)/3 · 10⁻⁴ s².
+    // For 0.02 rad that is 0.033 and 0.012 rad²/s² of two and three rows, for 0.05 rad 0.035 and 0.011 of
+    // four and six: the limit below lies between.
     for (quantum_rad, half_rows) in [(0.0, 1), (1e-4, 1), (2e-3, 1), (2e-2, 3), (5e-2, 6)] {
         let found = rates(quantum_rad);
         assert_eq!(found.window.rows, half_rows, "{quantum_rad}");
