@@ -28,8 +28,9 @@ pub(crate) struct PoseTrack {
     steps_m: Vec<Wheels<f64>>,
     /// For each pose the number of steps before it.
     after: Vec<usize>,
-    /// For each pose the number of rows missing before it, by their times.
-    gaps: Vec<usize>,
+    /// For each pose the number of gaps, where rows are missing, that have ended before it, and that have
+    /// begun.
+    gaps: Vec<(usize, usize)>,
 }
 
 impl PoseTrack {
@@ -79,20 +80,20 @@ impl PoseTrack {
                 gaps += usize::from(row > 0 && rows_s[row] - rows_s[row - 1] > gap_s);
                 row += 1;
             }
-            // The row that the pose lies in counts to the window before it and to the one after it.
             let within = row < rows_s.len() && row > 0 && rows_s[row] - rows_s[row - 1] > gap_s;
             go(between(taken_s));
             of.t_s.push(sample.t_s);
             of.measured.push(pose);
             of.after.push(of.steps_m.len());
-            of.gaps.push(gaps + usize::from(within));
+            of.gaps.push((gaps, gaps + usize::from(within)));
         }
         (of.t_s.len() >= MIN_WINDOW_POSES).then_some(of)
     }
 
     /// Are rows missing between two poses? What the wheels did meanwhile may be missing with them.
     pub(crate) fn has_gap(&self, (from, to): (usize, usize)) -> bool {
-        self.gaps[to] > self.gaps[from.saturating_sub(1)]
+        let ((ended, _), (_, begun)) = (self.gaps[from], self.gaps[to]);
+        begun > ended
     }
 
     /// How many poses.
@@ -324,5 +325,52 @@ impl Extrinsics {
 
     fn body_from_sensor(&self) -> Pose {
         Pose::new(self.0[2], self.0[3], self.0[1].atan2(self.0[0]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use dataset::{NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, WheelLog};
+
+    use super::*;
+
+    #[test]
+    fn windows_have_the_rows_between_their_poses_and_know_where_some_are_missing() {
+        // A radian a second by both wheels; rows every tenth, of which those from 3.0 to 3.9 s are missing; a
+        // pose every half second, 20 ms behind a row.
+        let t_s: Vec<f64> = (0..=80).filter(|row| !(30..40).contains(row)).map(|row| 0.1 * f64::from(row)).collect();
+        let odometry = Odometry { wheels: WheelLog::Angles(Wheels::both(t_s.clone())), t_s, ..Odometry::default() };
+        let pose = |k: u32| TruthSample::new(0.5 * f64::from(k) + 0.52, 0.0, 0.0, Some(0.0));
+        let dataset = Dataset {
+            provenance: Provenance::default(),
+            robot: NominalRobot {
+                left_wheel_diameter_m: 0.16,
+                right_wheel_diameter_m: 0.16,
+                wheel_separation_m: 0.36,
+                ticks_per_rev: None,
+                counter_bits: None,
+            },
+            truth_noise: TruthNoise::default(),
+            points: Vec::new(),
+            runs: vec![Run {
+                info: RunInfo { continuous: true, ..RunInfo::default() },
+                odometry,
+                truth: (0..14).map(pose).collect(),
+                ..Run::default()
+            }],
+        };
+        let tracks = PoseTrack::of_all(std::slice::from_ref(&dataset), 0.0);
+        let [track] = &tracks[..] else { panic!("one run") };
+        assert_eq!(track.len(), 14);
+        // A step each to the five rows between poses, and one to the pose; none before the first pose.
+        assert_eq!(track.after[..5], [1, 7, 13, 19, 25]);
+        let travel_m = track.travel_m((1, 4));
+        assert!((travel_m.left - 0.08 * 1.5).abs() < 1e-12 && (travel_m.right - 0.08 * 1.5).abs() < 1e-12);
+        assert!(track.steps_m.iter().all(|step| step.left >= 0.0), "no row is driven twice");
+        // Poses at 2.52, 3.02, 3.52 and 4.02 s are numbers 4 to 7, and the gap is from 2.9 to 4.0 s. Rejects
+        // gaps that count before a pose alone: of two poses within a gap, none is between them then.
+        let with_gap: Vec<usize> = (0..13).filter(|&from| track.has_gap((from, from + 1))).collect();
+        assert_eq!(with_gap, [4, 5, 6]);
+        assert!(track.has_gap((3, 8)) && !track.has_gap((1, 4)) && !track.has_gap((7, 12)));
     }
 }
