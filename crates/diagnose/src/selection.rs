@@ -101,11 +101,12 @@ fn without_what_cancels<'a>(
         })
         .collect();
     let all: Vec<&'static str> = model.candidates.iter().map(Candidate::id).collect();
-    subsets.push(model);
-    // A single effect cancels nothing.
-    let some_cancel: Vec<bool> = subsets.iter().map(|subset| cancellation(subset) > MAX_CANCELLATION).collect();
-    let mut cancels = some_cancel.iter();
-    subsets.retain(|_| cancels.next() == Some(&false));
+    subsets.retain(|subset| cancellation(subset) <= MAX_CANCELLATION);
+    let all_cancel = cancellation(&model) > MAX_CANCELLATION;
+    // A single effect cancels nothing, but may have no fit of its own.
+    if !all_cancel || subsets.is_empty() {
+        subsets.push(model);
+    }
     let odds: Vec<f64> = subsets.iter().map(|subset| log_bayes_factor(base, subset)).collect();
     let best = odds.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let is_close = |odds: f64| odds >= best - log_odds_margin(best);
@@ -117,7 +118,7 @@ fn without_what_cancels<'a>(
         })
         .unwrap_or(subsets.len() - 1);
     let chosen = subsets.swap_remove(fewest);
-    if some_cancel.last() == Some(&true) {
+    if all_cancel {
         let left: Vec<&'static str> = chosen.candidates.iter().map(Candidate::id).collect();
         refusals.extend(all.into_iter().filter(|id| !left.contains(id)).map(|id| (id, Refusal::Cancels)));
     }

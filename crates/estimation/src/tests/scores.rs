@@ -41,7 +41,7 @@ fn a_scan_has_samples_where_they_are_asked_for_and_nothing_of_columns_that_are_n
     let mut fit = ModelFit::from_parameters(MODEL, NOISE, &[dataset.session()]);
     let samples = fit.scan_with_samples(&mut []).samples;
     let count = |phases: Vec<usize>| phases.into_iter().sum::<usize>();
-    let innovations = fit.scan(&mut []).innovations.iter().map(|phase| phase.len()).collect();
+    let innovations = fit.scan(&mut []).innovations.iter().map(Vec::len).collect();
     // Of three components.
     assert_eq!(3 * count(samples.iter().map(Vec::len).collect()), count(innovations));
     assert!(samples.iter().any(|phase| !phase.is_empty()));
