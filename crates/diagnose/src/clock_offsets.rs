@@ -13,8 +13,8 @@ use kinematics::{DriveGeometry, Wheels, wrap_to_pi};
 
 use crate::log_rows::has_outlying_rows;
 use crate::settings::records::{
-    CLOCK_STEP_S, MAX_CLOCK_OFFSET_S, MAX_CLOCK_PAIRS, MAX_CLOCK_UNEXPLAINED, MAX_RATE_AT_REST, MIN_CLOCK_GAIN,
-    MIN_CLOCK_OFFSET_S, MIN_CLOCK_PAIRS, MIN_CLOCK_RUNS, MIN_CLOCK_SIGMAS, MIN_CLOCK_TURN_RAD, MIN_RUNS_PER_ODD_CLOCK,
+    CLOCK_STEP_S, MAX_CLOCK_OFFSET_S, MAX_CLOCK_PAIRS, MAX_CLOCK_UNEXPLAINED, MIN_CLOCK_GAIN, MIN_CLOCK_OFFSET_S,
+    MIN_CLOCK_PAIRS, MIN_CLOCK_RUNS, MIN_CLOCK_SIGMAS, MIN_CLOCK_TURN_RAD, MIN_RUNS_PER_ODD_CLOCK,
 };
 
 /// An offset of the instrument's clock: its poses are of so long before their stamps.
@@ -116,7 +116,7 @@ impl Profile {
     fn of(run: &RunView<'_>, dataset: &Dataset, geometry: &DriveGeometry) -> Option<Self> {
         let track = WheelAngleInterpolator::of(run, &dataset.robot)?;
         let (rows_s, truth) = (&run.odometry().t_s, &run.run().truth);
-        let [first_s, last_s] = known_between(rows_s, track.turns())?;
+        let (first_s, last_s) = (*rows_s.first()?, *rows_s.last()?);
         let within = |t_s: f64| t_s - MAX_CLOCK_OFFSET_S >= first_s && t_s + MAX_CLOCK_OFFSET_S <= last_s;
         let poses: Vec<Pose4> = truth
             .iter()
@@ -192,23 +192,6 @@ impl Profile {
     }
 }
 
-/// The instants between which the turns of the wheels are known: of the log; without an end where the robot
-/// sets off or comes to rest there, as it stood before and stands behind.
-fn known_between(rows_s: &[f64], turns: &Wheels<Vec<f64>>) -> Option<[f64; 2]> {
-    let (first_s, last_s) = (*rows_s.first()?, *rows_s.last()?);
-    let rate = |row: usize| {
-        let by_wheel = turns.as_ref().map(|turns| (turns[row + 1] - turns[row]).abs());
-        by_wheel.left.max(by_wheel.right) / (rows_s[row + 1] - rows_s[row])
-    };
-    let intervals = rows_s.len().checked_sub(1).filter(|intervals| *intervals > 0)?;
-    let fastest = (0..intervals).map(rate).fold(0.0, f64::max);
-    let stands = |row: usize| rate(row) <= MAX_RATE_AT_REST * fastest;
-    Some([
-        if stands(0) { f64::NEG_INFINITY } else { first_s },
-        if stands(intervals - 1) { f64::INFINITY } else { last_s },
-    ])
-}
-
 /// Turns of the wheels at an instant of the log, between rows in proportion.
 pub(crate) fn turns_at(rows_s: &[f64], turns: &Wheels<Vec<f64>>, t_s: f64) -> Wheels<f64> {
     let row = rows_s.partition_point(|row_s| *row_s <= t_s).clamp(1, rows_s.len() - 1) - 1;
@@ -282,42 +265,6 @@ mod tests {
         // Poses are taken at hundredths of a second.
         assert!((offset.offset_s - 0.3).abs() < 0.01, "{}", offset.offset_s);
         assert_eq!(found.records.expect("one is off")[0].runs.len(), 4);
-    }
-
-    #[test]
-    fn a_robot_that_sets_off_and_stops_in_the_log_stood_before_and_stands_behind() {
-        let rows_s = [0.0, 1.0, 2.0, 3.0];
-        let known = |left: [f64; 4], right: [f64; 4]| {
-            known_between(&rows_s, &Wheels { left: left.to_vec(), right: right.to_vec() })
-        };
-        let (before, behind) = (f64::NEG_INFINITY, f64::INFINITY);
-        assert_eq!(known([0.0, 0.1, 2.1, 2.1], [0.0, 0.0, 2.0, 2.0]), Some([before, behind]));
-        // Rejects a mean of both wheels: one of them turns at the end.
-        assert_eq!(known([0.0, 0.1, 2.1, 1.1], [0.0, 0.0, 2.0, 3.0]), Some([before, 3.0]));
-        assert_eq!(known([0.0, 1.0, 2.0, 3.0], [0.0; 4]), Some([0.0, 3.0]));
-        assert_eq!(known_between(&[1.0], &Wheels::both(vec![0.0])), None);
-    }
-
-    #[test]
-    fn a_short_run_between_two_rests_says_its_offset() {
-        // A quarter of a second less than two seconds of driving, with half a second at rest on either side:
-        // rejects a margin of the largest offset at both ends, which leaves no pose.
-        let mut log = driven(&[0.0; 4]);
-        let turned = |t_s: f64| 3.0 * (t_s - 0.5).clamp(0.0, 1.75) - (4.0 * (t_s - 0.5).clamp(0.0, 1.75)).sin() * 0.75;
-        let turn_rate = log.robot.left_wheel_diameter_m / log.robot.wheel_separation_m;
-        let run = &mut log.runs[2];
-        run.odometry.t_s = (0..=137).map(|row| 0.02 * f64::from(row)).collect();
-        let angles = |sign: f64| run.odometry.t_s.iter().map(|t_s| sign * turned(*t_s)).collect();
-        run.odometry.wheels = WheelLog::Angles(Wheels { left: angles(-1.0), right: angles(1.0) });
-        let pose = |k: u32| {
-            let t_s = 0.05 * f64::from(k);
-            TruthSample::new(t_s, 0.0, 0.0, Some(wrap_to_pi(turn_rate * turned(t_s - 0.3))))
-        };
-        run.truth = (0..55).map(pose).collect();
-        let found = offsets(&[log]);
-        let [offset] = &found.offsets[..] else { panic!("one run: {:?}", found.offsets) };
-        assert_eq!(offset.runs.as_deref(), Some(&["run-2".to_owned()][..]));
-        assert!((offset.offset_s - 0.3).abs() < 0.01, "{}", offset.offset_s);
     }
 
     #[test]
