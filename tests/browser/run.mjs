@@ -184,8 +184,8 @@ async function look(browser, name, wanted) {
       if (loads_ms.length > 0) await page.reload({ waitUntil: "load" });
       await page.waitForFunction(() => performance.getEntriesByType("navigation")[0].loadEventEnd > 0);
       loads_ms.push(await page.evaluate(() => performance.getEntriesByType("navigation")[0].loadEventEnd));
-    } while (loads_ms.length < 3 && !(loads_ms.at(-1) > 0 && loads_ms.at(-1) < MAX_LOAD_MS));
-    const load_ms = loads_ms.at(-1);
+    } while (loads_ms.length < 3 && loads_ms.at(-1) >= MAX_LOAD_MS);
+    const load_ms = Math.min(...loads_ms);
     check(name, `loads within ${MAX_LOAD_MS} ms`, load_ms > 0 && load_ms < MAX_LOAD_MS, `${loads_ms.join(", ")} ms`);
   }
   if (wanted.runs) {

@@ -6,7 +6,8 @@ use diagnose::{ExtendedModel, ExtendedModelError, Options, diagnose};
 use estimation::FitSettings;
 use scenario::Scenario;
 
-use crate::hidden_effects::{robot, simulated};
+use crate::hidden_effects::robot;
+use crate::motion_capture::simulated;
 
 /// Effects that no geometry follows on these paths.
 const LARGE: [(&str, &str); 3] = [

@@ -13,29 +13,19 @@ use motion_programs::Schedule;
 use scenario::Scenario;
 use statrs::distribution::{Binomial, DiscreteCDF};
 
-const MOTION_CAPTURE: &str = include_str!("../../scenarios/motion-capture.toml");
+use crate::motion_capture::{self, simulated};
 
 /// Straights, spins, squares and circles under motion capture, with calibration errors and one more effect.
 pub(crate) fn robot(extra: &str) -> Scenario {
-    #[derive(serde::Deserialize)]
-    struct List {
-        #[serde(default)]
-        effect: Vec<Effect>,
-    }
-    let mut scenario = Scenario::parse(MOTION_CAPTURE, "motion-capture.toml").expect("the shipped scenario");
-    scenario.effects.retain(|effect| ["wheel_scale", "wheel_mismatch", "wheelbase"].contains(&effect.id()));
-    scenario.effects.extend(toml::from_str::<List>(extra).expect("an effect").effect);
-    scenario.protocols = vec![
-        Schedule::Straights { length_m: 1.5, runs: 6 },
-        Schedule::Spins { turn_rad: std::f64::consts::TAU, runs: 4 },
-        Schedule::Squares { side_m: 1.0, runs_each_way: 2 },
-        Schedule::Circles { radius_m: 0.6, turns: None, runs_each_way: 2 },
-    ];
-    scenario
-}
-
-pub(crate) fn simulated(scenario: &Scenario, seed: u64) -> Dataset {
-    sim_yair::simulate(scenario, seed, 0).expect("simulates").dataset
+    motion_capture::robot(
+        extra,
+        &[
+            Schedule::Straights { length_m: 1.5, runs: 6 },
+            Schedule::Spins { turn_rad: std::f64::consts::TAU, runs: 4 },
+            Schedule::Squares { side_m: 1.0, runs_each_way: 2 },
+            Schedule::Circles { radius_m: 0.6, turns: None, runs_each_way: 2 },
+        ],
+    )
 }
 
 fn diagnosed(dataset: &Dataset, without: &[&str]) -> Document {

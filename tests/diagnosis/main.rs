@@ -5,6 +5,8 @@ mod blind_benchmark;
 mod extended_model;
 mod hidden_effects;
 mod large_log;
+#[path = "../support/motion_capture.rs"]
+mod motion_capture;
 mod nested_gain;
 mod ordinary_logs;
 #[path = "../support/plain_robot.rs"]

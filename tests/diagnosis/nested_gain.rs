@@ -3,7 +3,8 @@
 use dataset::Dataset;
 use diagnose::{GainLevel, NestedGain, Options, diagnose, nested_gains};
 
-use crate::hidden_effects::{robot, simulated};
+use crate::hidden_effects::robot;
+use crate::motion_capture::simulated;
 
 /// A session of the shipped robot, with another name.
 fn session(effect: &str, name: &str, seed: u64) -> Dataset {

@@ -7,38 +7,19 @@
 //! fixed.
 #![allow(clippy::print_stdout)] // every case with its seed
 
+use crate::motion_capture::{robot, simulated};
 use crate::support::{document, refusal, succeed};
 use dataset::{Dataset, Protocol, Run};
 use diagnose::{Document, Limits, NextExperiment, Options, Predicted, diagnose, plan_scenario};
-use effects::{Address, Effect, StreamName};
+use effects::{Address, StreamName};
 use estimation::FitSettings;
 use motion_programs::Schedule;
 use scenario::Scenario;
-
-const MOTION_CAPTURE: &str = include_str!("../../scenarios/motion-capture.toml");
 
 const STRAIGHTS: Schedule = Schedule::Straights { length_m: 1.5, runs: 8 };
 const SPINS: Schedule = Schedule::Spins { turn_rad: std::f64::consts::TAU, runs: 8 };
 const SQUARES: Schedule = Schedule::Squares { side_m: 1.0, runs_each_way: 3 };
 const CIRCLES: Schedule = Schedule::Circles { radius_m: 0.6, turns: None, runs_each_way: 4 };
-
-/// A robot under motion capture with calibration errors and one more effect, in a session that does not show
-/// which.
-fn robot(effect: &str, protocols: &[Schedule]) -> Scenario {
-    #[derive(serde::Deserialize)]
-    struct List {
-        effect: Vec<Effect>,
-    }
-    let mut scenario = Scenario::parse(MOTION_CAPTURE, "motion-capture.toml").expect("the shipped scenario");
-    scenario.effects.retain(|effect| ["wheel_scale", "wheel_mismatch", "wheelbase"].contains(&effect.id()));
-    scenario.effects.extend(toml::from_str::<List>(effect).expect("an effect").effect);
-    scenario.protocols = protocols.to_vec();
-    scenario
-}
-
-fn simulated(scenario: &Scenario, seed: u64) -> Dataset {
-    sim_yair::simulate(scenario, seed, 0).expect("simulates").dataset
-}
 
 fn planned(datasets: &[Dataset], limits: Limits) -> Document {
     diagnose(datasets, &Options { limits, ..Options::default() }).expect("a diagnosis").document

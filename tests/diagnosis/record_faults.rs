@@ -7,7 +7,8 @@ use dataset::{
 use diagnose::{Document, Options, Verdict, diagnose};
 use kinematics::Increment;
 
-use crate::hidden_effects::{robot, simulated};
+use crate::hidden_effects::robot;
+use crate::motion_capture::simulated;
 use crate::support::real_data::real_data;
 
 fn diagnosed(dataset: &Dataset) -> Document {

@@ -5,6 +5,8 @@
 
 #[path = "../../crates/estimation/src/tests/golden_numbers.rs"]
 mod golden_numbers;
+#[path = "../support/motion_capture.rs"]
+mod motion_capture;
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -15,7 +17,7 @@ use diagnose::{Limits, Options, diagnose, nested_gains, plan_scenario};
 use motion_programs::Schedule;
 use scenario::Scenario;
 
-const MOTION_CAPTURE: &str = include_str!("../../scenarios/motion-capture.toml");
+use crate::motion_capture::MOTION_CAPTURE;
 
 /// Of the blind benchmark's cases under this seed, small ones of many kinds: coarse and fine encoders, poses
 /// and ends, one run and many, with effects of wheels, floors, instruments and clocks, with errors that last,
@@ -29,19 +31,12 @@ fn file(name: &str) -> PathBuf {
 
 /// The shipped scenario with calibration errors, a few short runs and one more effect.
 fn simulated(effect: &str, seed: u64) -> Dataset {
-    #[derive(serde::Deserialize)]
-    struct List {
-        effect: Vec<effects::Effect>,
-    }
-    let mut scenario = Scenario::parse(MOTION_CAPTURE, "motion-capture.toml").expect("the shipped scenario");
-    scenario.effects.retain(|effect| ["wheel_scale", "wheel_mismatch", "wheelbase"].contains(&effect.id()));
-    scenario.effects.extend(toml::from_str::<List>(effect).expect("an effect").effect);
-    scenario.protocols = vec![
+    let protocols = [
         Schedule::Straights { length_m: 1.0, runs: 4 },
         Schedule::Spins { turn_rad: std::f64::consts::PI, runs: 4 },
         Schedule::Squares { side_m: 0.5, runs_each_way: 1 },
     ];
-    sim_yair::simulate(&scenario, seed, 0).expect("simulates").dataset
+    motion_capture::simulated(&motion_capture::robot(effect, &protocols), seed)
 }
 
 /// Two terms of which each would be far more than both are together.
@@ -49,20 +44,20 @@ const CANCELLING: (u64, u64) = (20_022, 619);
 
 /// Logs of what the blind benchmark does not draw.
 fn other_logs() -> Vec<(&'static str, Dataset)> {
-    let none = "effect = []";
+    let sound = simulated("", 5);
     let described = |diameters: f64, separation: f64| {
-        let mut dataset = simulated(none, 5);
+        let mut dataset = sound.clone();
         dataset.robot.left_wheel_diameter_m /= diameters;
         dataset.robot.right_wheel_diameter_m /= diameters;
         dataset.robot.wheel_separation_m /= separation;
         dataset
     };
-    let mut late = simulated(none, 5);
+    let mut late = sound.clone();
     late.runs[5].truth.iter_mut().for_each(|sample| sample.t_s += 0.3);
-    let mut lifted = simulated(none, 5);
+    let mut lifted = sound.clone();
     lifted.runs[1].truth.iter_mut().filter(|sample| sample.t_s > 3.0).for_each(|sample| sample.y_m += 0.1);
     // Rows are stamped when they are received: some are late, and none overtakes another.
-    let mut received = simulated(none, 5);
+    let mut received = sound.clone();
     let mut state = 1_u64;
     for run in &mut received.runs {
         let mut before_s = f64::NEG_INFINITY;
@@ -75,7 +70,7 @@ fn other_logs() -> Vec<(&'static str, Dataset)> {
         }
     }
     // Each run's poses are those of another one.
-    let mut exchanged = simulated(none, 5);
+    let mut exchanged = sound.clone();
     let runs = exchanged.runs.len();
     for other in 1..runs {
         let (before, behind) = exchanged.runs.split_at_mut(other);

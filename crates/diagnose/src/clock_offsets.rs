@@ -200,7 +200,7 @@ pub(crate) fn turns_at(rows_s: &[f64], turns: &Wheels<Vec<f64>>, t_s: f64) -> Wh
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use dataset::{NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, WheelLog};
     use kinematics::{Increment, Pose};
 
@@ -213,7 +213,7 @@ mod tests {
 
     /// Runs of twenty seconds that speed up, slow down and turn, whose poses are of so long before their
     /// stamps.
-    fn driven(offsets_s: &[f64]) -> Dataset {
+    pub(crate) fn driven(offsets_s: &[f64]) -> Dataset {
         let wheels_at =
             |t_s: f64| Wheels { left: 4.0 * t_s - 2.0 * (0.9 * t_s).cos(), right: 4.0 * t_s + 1.5 * (1.3 * t_s).sin() };
         let path: Vec<Pose> = (1..=2600)

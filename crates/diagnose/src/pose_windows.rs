@@ -330,9 +330,10 @@ impl Extrinsics {
 
 #[cfg(test)]
 mod tests {
-    use dataset::{NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, WheelLog};
+    use dataset::{Odometry, Run, RunInfo, WheelLog};
 
     use super::*;
+    use crate::clock_offsets::tests::driven;
 
     #[test]
     fn windows_have_the_rows_between_their_poses_and_know_where_some_are_missing() {
@@ -341,23 +342,12 @@ mod tests {
         let t_s: Vec<f64> = (0..=80).filter(|row| !(30..40).contains(row)).map(|row| 0.1 * f64::from(row)).collect();
         let odometry = Odometry { wheels: WheelLog::Angles(Wheels::both(t_s.clone())), t_s, ..Odometry::default() };
         let pose = |k: u32| TruthSample::new(0.5 * f64::from(k) + 0.52, 0.0, 0.0, Some(0.0));
-        let dataset = Dataset {
-            provenance: Provenance::default(),
-            robot: NominalRobot {
-                left_wheel_diameter_m: 0.16,
-                right_wheel_diameter_m: 0.16,
-                wheel_separation_m: 0.36,
-                ticks_per_rev: None,
-                counter_bits: None,
-            },
-            truth_noise: TruthNoise::default(),
-            points: Vec::new(),
-            runs: vec![Run {
-                info: RunInfo { continuous: true, ..RunInfo::default() },
-                odometry,
-                truth: (0..14).map(pose).collect(),
-                ..Run::default()
-            }],
+        let mut dataset = driven(&[0.0]);
+        dataset.runs[0] = Run {
+            info: RunInfo { continuous: true, ..RunInfo::default() },
+            odometry,
+            truth: (0..14).map(pose).collect(),
+            ..Run::default()
         };
         let tracks = PoseTrack::of_all(std::slice::from_ref(&dataset), 0.0);
         let [track] = &tracks[..] else { panic!("one run") };

@@ -40,12 +40,12 @@ fn a_scan_has_samples_where_they_are_asked_for_and_nothing_of_columns_that_are_n
     let dataset = dataset_of(3, true);
     let mut fit = ModelFit::from_parameters(MODEL, NOISE, &[dataset.session()]);
     let samples = fit.scan_with_samples(&mut []).samples;
-    let count = |phases: Vec<usize>| phases.into_iter().sum::<usize>();
-    let innovations = fit.scan(&mut []).innovations.iter().map(Vec::len).collect();
+    let scanned = fit.scan(&mut []);
+    let innovations: usize = scanned.innovations.iter().map(Vec::len).sum();
     // Of three components.
-    assert_eq!(3 * count(samples.iter().map(Vec::len).collect()), count(innovations));
+    assert_eq!(3 * samples.iter().map(Vec::len).sum::<usize>(), innovations);
     assert!(samples.iter().any(|phase| !phase.is_empty()));
-    assert!(fit.scan(&mut []).samples.iter().all(Vec::is_empty));
+    assert!(scanned.samples.iter().all(Vec::is_empty));
 
     fit.columns = Column::GEOMETRY.to_vec();
     let all = total(&fit.scan(&mut [Box::new(TravelTerm)]).runs).expect("runs");
