@@ -123,7 +123,7 @@ impl TrueNoise {
 /// Half of the χ² of noise-free runs under a model with terms: what the model costs of the log score, on
 /// average over the measurements' errors.
 pub(crate) fn misfit(datasets: &[Dataset], model: &Model, noise: TrueNoise, terms: &mut [Box<dyn ModelTerm>]) -> f64 {
-    measurement(datasets, model, noise, terms).map_or(0.0, |measured| 0.5 * measured.total.chi_square)
+    measurement(&records(datasets), model, noise, terms).map_or(0.0, |measured| 0.5 * measured.total.chi_square)
 }
 
 /// What a model with terms gains in log score over another without them on noise-free runs, on average over
@@ -180,8 +180,9 @@ pub(crate) fn misfit_of_form(
     let columns: Vec<Column> =
         Column::GEOMETRY.into_iter().chain((0..model.term_values.len()).map(Column::Term)).collect();
     let (mut model, mut least) = (model.clone(), f64::INFINITY);
+    let records = records(datasets);
     for _ in 0..=GAUSS_NEWTON_STEPS {
-        let Some(measured) = measurement(datasets, &model, noise, terms) else { return least };
+        let Some(measured) = measurement(&records, &model, noise, terms) else { return least };
         least = least.min(0.5 * measured.total.chi_square);
         let Some((step, _)) = measured.total.of(&columns).solve() else { return least };
         columns.iter().zip(step.iter()).for_each(|(column, by)| model.advance(*column, *by));
@@ -196,17 +197,20 @@ struct NoiseFreePass {
     z: Vec<((usize, usize), f64)>,
 }
 
+fn records(datasets: &[Dataset]) -> Records<'_> {
+    let sessions: Vec<Session<'_>> = datasets.iter().map(Dataset::session).collect();
+    Records::of(&sessions)
+}
+
 fn measurement(
-    datasets: &[Dataset],
+    records: &Records<'_>,
     model: &Model,
     noise: TrueNoise,
     terms: &mut [Box<dyn ModelTerm>],
 ) -> Option<NoiseFreePass> {
-    let sessions: Vec<Session<'_>> = datasets.iter().map(Dataset::session).collect();
-    let records = Records::of(&sessions);
-    let selections = Selection::of(&records, Thinning::NONE, model);
+    let selections = Selection::of(records, Thinning::NONE, model);
     let headings = vec![0.0; records.segments.len()];
-    let pass = pass_with_innovations(&records, &selections, model, &noise.noise(), &headings, terms, OutlierGate::Off);
+    let pass = pass_with_innovations(records, &selections, model, &noise.noise(), &headings, terms, OutlierGate::Off);
     let total = total(&pass.runs)?;
     let z = pass.innovations.iter().flatten().map(|found| (records.segments[found.segment].run, found.z)).collect();
     Some(NoiseFreePass { total, z })
@@ -259,24 +263,26 @@ impl Detectability {
         let has_gyro = datasets.iter().any(|dataset| dataset.truth_noise.gyro.noise_rad_per_sqrt_s.is_some());
         let columns: Vec<Column> = Column::GEOMETRY.into_iter().chain(has_gyro.then_some(Column::GyroScale)).collect();
         let free: Vec<usize> = columns.iter().map(|column| column.index()).collect();
-        let mut model = Model::of(truth, at - Column::BASE.len());
+        let (with, without) = (records(datasets), records(without));
+        let mut best = Model::of(truth, 0);
         if has_gyro {
             // Its scale and how wrong it is are no signature of the effect's.
             for _ in 0..GAUSS_NEWTON_STEPS {
-                let plain = measurement(without, &model, noise, &mut terms)?;
+                let plain = measurement(&without, &best, noise, &mut [])?;
                 let step = to_best_geometry(&plain.total, &[Column::GyroScale.index()])?;
-                model.advance(Column::GyroScale, step[0]);
+                best.advance(Column::GyroScale, step[0]);
             }
         }
-        let plain = measurement(without, &model, noise, &mut terms)?;
+        let with_terms = |model: &Model| Model { term_values: vec![0.0; at - Column::BASE.len()], ..model.clone() };
+        let plain = measurement(&without, &with_terms(&best), noise, &mut terms)?;
         let mut at_truth = None;
-        let mut measured = measurement(datasets, &model, noise, &mut terms)?;
         for _ in 0..GAUSS_NEWTON_STEPS {
+            let measured = measurement(&with, &best, noise, &mut [])?;
             at_truth.get_or_insert(measured.total.chi_square);
             let step = to_best_geometry(&measured.total, &free)?;
-            columns.iter().zip(step.iter()).for_each(|(column, by)| model.advance(*column, *by));
-            measured = measurement(datasets, &model, noise, &mut terms)?;
+            columns.iter().zip(step.iter()).for_each(|(column, by)| best.advance(*column, *by));
         }
+        let mut measured = measurement(&with, &with_terms(&best), noise, &mut terms)?;
         if measured.z.len() == plain.z.len() {
             measured.total.gradient -= &plain.total.gradient;
             measured.z.iter_mut().zip(&plain.z).for_each(|(measured, plain)| measured.1 -= plain.1);
@@ -286,7 +292,6 @@ impl Detectability {
             }
         }
         let at_truth = at_truth.unwrap_or(0.0);
-        let best = Model { term_values: Vec::new(), ..model };
         Some(Self { scatter: scatter(&measured.z), total: measured.total, at_truth, best, candidates, free })
     }
 
