@@ -88,7 +88,7 @@ fn run(number: usize, random: &mut Xoshiro256PlusPlus) -> Run {
     let protocols =
         [None, Some(Protocol::Straight), Some(Protocol::Spin), Some(Protocol::SquareCw), Some(Protocol::SquareCcw)];
     let info = RunInfo { id: format!("{number}"), protocol: pick(&protocols, random), ..RunInfo::default() };
-    Run { info, odometry: Odometry { t_s, wheels, ..Odometry::default() }, truth, ..Run::default() }
+    Run { info, odometry: Odometry { t_s: t_s.into(), wheels, ..Odometry::default() }, truth, ..Run::default() }
 }
 
 /// A dataset that its own writer accepts.

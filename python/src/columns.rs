@@ -106,7 +106,7 @@ impl Columns {
                 return Err(PyValueError::new_err(format!("wheels: \"{other}\" is none of ticks, rad, mps and twist")));
             }
         };
-        let odometry = Odometry { t_s: t_s.as_array().to_vec(), wheels, ..Odometry::default() };
+        let odometry = Odometry { t_s: t_s.as_array().to_vec().into(), wheels, ..Odometry::default() };
         let info = RunInfo { id, ..RunInfo::default() };
         self.dataset.runs.push(Run { info, odometry, ..Run::default() });
         Ok(())

@@ -138,7 +138,7 @@ fn of_speeds(false_share: f64) -> Dataset {
         v_mps.push(v_m_s);
         omega_radps.push(omega_rad_s);
     }
-    let odometry = Odometry { t_s, wheels: WheelLog::Twist { v_mps, omega_radps }, ..Odometry::default() };
+    let odometry = Odometry { t_s: t_s.into(), wheels: WheelLog::Twist { v_mps, omega_radps }, ..Odometry::default() };
     let info = RunInfo { id: "run-01".to_owned(), continuous: false, ..RunInfo::default() };
     Dataset {
         provenance: Provenance::default(),

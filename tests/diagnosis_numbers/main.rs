@@ -61,7 +61,7 @@ fn other_logs() -> Vec<(&'static str, Dataset)> {
     let mut state = 1_u64;
     for run in &mut received.runs {
         let mut before_s = f64::NEG_INFINITY;
-        for t_s in &mut run.odometry.t_s {
+        for t_s in run.odometry.t_s.iter_mut() {
             // A congruential generator (Knuth 1998) for exponential delays of 15 ms.
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
             let share = ((state >> 40) as f64 + 0.5) / (1_u64 << 24) as f64;

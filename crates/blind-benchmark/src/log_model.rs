@@ -33,7 +33,7 @@ pub(crate) fn record(conditions: &Conditions, run: &mut Run, draw: &mut Draw) {
 
 fn stamp(run: &mut Run, mut late_s: impl FnMut() -> f64) {
     let mut before_s = f64::NEG_INFINITY;
-    for t_s in &mut run.odometry.t_s {
+    for t_s in run.odometry.t_s.iter_mut() {
         *t_s = (*t_s + late_s()).max(before_s + ROW_ON_LINE_S);
         before_s = *t_s;
     }

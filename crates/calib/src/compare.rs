@@ -264,7 +264,7 @@ mod tests {
         Run {
             info: RunInfo { id: id.to_owned(), protocol: Some(protocol), ..RunInfo::default() },
             odometry: Odometry {
-                t_s: vec![0.0, 1.0],
+                t_s: vec![0.0, 1.0].into(),
                 wheels: WheelLog::Ticks(Wheels { left: vec![0, ticks.0], right: vec![0, ticks.1] }),
                 ..Odometry::default()
             },

@@ -170,7 +170,7 @@ mod tests {
     fn run() -> Run {
         Run {
             odometry: Odometry {
-                t_s: vec![0.0, 1000.0],
+                t_s: vec![0.0, 1000.0].into(),
                 wheels: WheelLog::Ticks(Wheels { left: vec![0, 7], right: vec![0, -9] }),
                 ..Odometry::default()
             },
@@ -193,7 +193,7 @@ mod tests {
         };
         let mut run = run();
         corrections.apply(&mut run);
-        assert_eq!(run.odometry.t_s, [0.0, 1.0]);
+        assert_eq!(*run.odometry.t_s, [0.0, 1.0]);
         // The column called right is reversed, and is the left wheel's.
         assert_eq!(run.odometry.wheels, WheelLog::Ticks(Wheels { left: vec![0, 9], right: vec![0, 7] }));
         let quarter_rad = std::f64::consts::FRAC_PI_2;

@@ -40,7 +40,7 @@ mod tests {
     fn one_count_more_is_another_run() {
         let run = |last: i64| Run {
             odometry: Odometry {
-                t_s: vec![0.0, 0.1],
+                t_s: vec![0.0, 0.1].into(),
                 wheels: WheelLog::Ticks(Wheels { left: vec![0, 5], right: vec![0, last] }),
                 ..Odometry::default()
             },

@@ -7,6 +7,7 @@ use crate::interval_means::interval_means;
 use crate::map_distortion::MapDistortion;
 use crate::partial::{GyroNoise, GyroSample, HeadingReading, LidarExtrinsics, Revisit, TapeDistance, WallReading};
 use crate::pose_covariance::PoseCovariance;
+use crate::timestamps::Timestamps;
 use jiff::Timestamp;
 use kinematics::{DriveGeometry, GeometryError, Point, Wheels};
 use serde::{Deserialize, Serialize};
@@ -305,7 +306,7 @@ pub struct ProtocolSettings {
 #[derive(Debug, Clone, Default)]
 pub struct Odometry {
     /// Seconds from the run's start, strictly increasing.
-    pub t_s: Vec<f64>,
+    pub t_s: Timestamps,
     /// The wheels.
     pub wheels: WheelLog,
     /// Further known columns, each as long as `t_s`; NaN where a channel that may have gaps has none.

@@ -70,8 +70,7 @@ pub struct SamplingPeriod {
 
 impl SamplingPeriod {
     /// The beat of stamps that do not fall; `None` where rows are too few to have one.
-    #[must_use]
-    pub fn of(t_s: &[f64]) -> Option<Self> {
+    pub(crate) fn of(t_s: &[f64]) -> Option<Self> {
         if t_s.len() < MIN_ROWS {
             return None;
         }

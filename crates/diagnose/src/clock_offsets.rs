@@ -237,7 +237,7 @@ pub(crate) mod tests {
             });
             Run {
                 info: RunInfo { id: format!("run-{number}"), continuous: true, ..RunInfo::default() },
-                odometry: Odometry { t_s: t_s.clone(), wheels: WheelLog::Angles(angles), ..Odometry::default() },
+                odometry: Odometry { t_s: t_s.clone().into(), wheels: WheelLog::Angles(angles), ..Odometry::default() },
                 truth: truth.collect(),
                 ..Run::default()
             }
@@ -299,7 +299,7 @@ pub(crate) mod tests {
             let rad = std::f64::consts::TAU / 155.0;
             let counted = |sign: f64| t_s.iter().map(|t_s| (sign * rate_rad_s * t_s / rad).floor() * rad).collect();
             run.odometry.wheels = WheelLog::Angles(Wheels { left: counted(-1.0), right: counted(1.0) });
-            run.odometry.t_s.clone_from(&t_s);
+            run.odometry.t_s = t_s.clone().into();
             let pose = |k: u32| {
                 let t_s = 0.05 * f64::from(k) + 0.003;
                 TruthSample::new(t_s, 0.0, 0.0, Some(wrap_to_pi(turn_rate * t_s)))

@@ -5,7 +5,7 @@
 //! them, to a share of it. A clock of the instrument that is off by no more is therefore no finding beside
 //! them.
 
-use dataset::{Dataset, SamplingPeriod};
+use dataset::Dataset;
 
 use crate::document::Value;
 use crate::finding::Finding;
@@ -37,7 +37,7 @@ pub(crate) fn join_clock(findings: &mut Vec<Finding>, stamps: Option<&StampError
 fn lateness_s(recorded: &[Dataset]) -> f64 {
     let runs = recorded.iter().flat_map(|dataset| &dataset.runs).filter(|run| run.info.continuous);
     let (mut sum, mut count) = (0.0, 0.0);
-    for period in runs.filter_map(|run| SamplingPeriod::of(&run.odometry.t_s)) {
+    for period in runs.filter_map(|run| run.odometry.t_s.sampling_period()) {
         sum += period.late_s.iter().map(|late_s| late_s * late_s).sum::<f64>();
         count += period.late_s.len() as f64;
     }

@@ -340,7 +340,8 @@ mod tests {
         // A radian a second by both wheels; rows every tenth, of which those from 3.0 to 3.9 s are missing; a
         // pose every half second, 20 ms behind a row.
         let t_s: Vec<f64> = (0..=80).filter(|row| !(30..40).contains(row)).map(|row| 0.1 * f64::from(row)).collect();
-        let odometry = Odometry { wheels: WheelLog::Angles(Wheels::both(t_s.clone())), t_s, ..Odometry::default() };
+        let odometry =
+            Odometry { wheels: WheelLog::Angles(Wheels::both(t_s.clone())), t_s: t_s.into(), ..Odometry::default() };
         let pose = |k: u32| TruthSample::new(0.5 * f64::from(k) + 0.52, 0.0, 0.0, Some(0.0));
         let mut dataset = driven(&[0.0]);
         dataset.runs[0] = Run {

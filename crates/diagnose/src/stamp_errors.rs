@@ -3,7 +3,7 @@
 //! Speeds, accelerations and the instants of measurements all come from the stamps. Stamps that are wrong by
 //! much are therefore more than one linear term: what that term leaves resembles other effects.
 
-use dataset::{Dataset, SamplingPeriod};
+use dataset::Dataset;
 use estimation::{FitSettings, ModelFit, Thinning};
 
 use crate::augmented_model::{AugmentedModel, cost, count, refit};
@@ -58,7 +58,7 @@ pub(crate) fn uncertain_tick_s(datasets: &[Dataset]) -> f64 {
 
 fn uncertain_ticks_s(datasets: &[Dataset]) -> impl Iterator<Item = f64> {
     let runs = datasets.iter().flat_map(|dataset| &dataset.runs);
-    let periods = runs.filter_map(|run| SamplingPeriod::of(&run.odometry.t_s));
+    let periods = runs.filter_map(|run| run.odometry.t_s.sampling_period());
     periods.filter(|period| !period.is_certain()).map(|period| period.period_s)
 }
 

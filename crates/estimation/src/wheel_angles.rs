@@ -5,7 +5,7 @@
 //! same motion. A log whose rows jitter begins a little after its run does: half of an interval before the
 //! first row and after the last, the speeds of the interval there go on.
 
-use dataset::{NominalRobot, RunView, SamplingPeriod, WheelLog, row_jitter_s};
+use dataset::{NominalRobot, RunView, WheelLog, row_jitter_s};
 use kinematics::{Count, Wheels};
 
 use crate::settings::{MAX_EXTRAPOLATION, ROWS_OF_CHANGE, TIME_TOLERANCE_S};
@@ -96,8 +96,9 @@ impl<'a> WheelAngleInterpolator<'a> {
         let continuous = run.info().continuous;
         let drive = robot.geometry().map_or((1.0, Wheels::both(1.0)), |of| (of.wheel_separation_m(), of.m_per_rad()));
         // Of stamps that are exact but for a few, those few are true.
-        let period = if continuous && are_inexact(&odometry.t_s) { SamplingPeriod::of(&odometry.t_s) } else { None };
-        let late_s = period.map_or_else(|| vec![0.0; odometry.t_s.len()], |period| period.late_s);
+        let has_period = continuous && are_inexact(&odometry.t_s);
+        let period = if has_period { odometry.t_s.sampling_period() } else { None };
+        let late_s = period.map_or_else(|| vec![0.0; odometry.t_s.len()], |period| period.late_s.clone());
         let rates = WheelRates::of((&odometry.t_s, &late_s), &turn_rad, quantum_rad, drive, continuous);
         let late_s = if continuous {
             late_s.windows(2).map(|pair| [pair[0], pair[1]]).collect()

@@ -42,7 +42,7 @@ fn run(number: usize) -> Run {
     let info = RunInfo { id: format!("run-{number}"), continuous: true, ..RunInfo::default() };
     Run {
         info,
-        odometry: Odometry { t_s, wheels: WheelLog::Angles(angles), ..Odometry::default() },
+        odometry: Odometry { t_s: t_s.into(), wheels: WheelLog::Angles(angles), ..Odometry::default() },
         truth,
         ..Run::default()
     }

@@ -104,7 +104,7 @@ impl RunLog {
             protocol: run.info().protocol,
             turn_rad: run.info().settings.turn_rad,
             continuous: run.info().continuous,
-            t_s: odometry.t_s.clone(),
+            t_s: odometry.t_s.to_vec(),
             wheels,
             count_rad,
             has_rates: matches!(odometry.wheels, WheelLog::Speeds(_) | WheelLog::Twist { .. }),

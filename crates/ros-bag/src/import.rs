@@ -344,7 +344,7 @@ fn assemble(
         let rows_ns: Vec<i64> = rows.iter().map(|(_, time_ns)| *time_ns).collect();
         let rates = gyro.as_mut().and_then(|gyro| gyro.of_run(&rows_ns, (receipt(first), receipt(last))));
         let extra = rates.map(|rates| (ExtraChannel::GyroYawRate, rates)).into_iter().collect();
-        let odometry = Odometry { t_s, wheels: log, extra };
+        let odometry = Odometry { t_s: t_s.into(), wheels: log, extra };
         spans.push(RunSpan { clock_ns: (from_ns, to_ns), received_ns: (receipt(first), receipt(last)) });
         runs.push(Run { info, odometry, truth, truth_sigma, ..Run::default() });
     }

@@ -140,8 +140,8 @@ pub(crate) fn missed(dataset: &Dataset, term: &mut dyn ModelTerm, values: &[f64]
         let mut pose = seen(0) * body_from_seen.inverse();
         let mut measurement = 1;
         let rows = rows(run, ticks_per_rev);
-        let late_s = dataset::SamplingPeriod::of(&run.odometry.t_s)
-            .map_or_else(|| vec![0.0; run.odometry.t_s.len()], |period| period.late_s);
+        let period = run.odometry.t_s.sampling_period();
+        let late_s = period.map_or_else(|| vec![0.0; run.odometry.t_s.len()], |period| period.late_s.clone());
         let travel_of = |row: &Row| row.turned_rad.zip_with(geometry.m_per_rad(), |rad, m_per_rad| rad * m_per_rad);
         // Between two rows the speed is that of the rows around: of one to either side, or of four where
         // stamps are irregular; at the ends of the log, of as many as there are.

@@ -184,7 +184,7 @@ mod tests {
         assert_eq!((found.geometry.wheel_separation_m(), found.covariance), (0.363, None));
 
         let mut sparse = dataset(WheelLog::Ticks(Wheels { left: vec![0, 0], right: vec![0, 0] }), reference);
-        sparse.runs[0].odometry.t_s = vec![0.0, 2.0];
+        sparse.runs[0].odometry.t_s = vec![0.0, 2.0].into();
         let refused = Tachometer.calibrate(&[sparse.session()]).expect_err("no rows inside").to_string();
         assert!(refused.contains("too far apart"), "{refused}");
         // On a clock that began long ago. Rejects a gap that is measured against instants, not intervals.

@@ -139,7 +139,7 @@ impl Log {
             true => WheelLog::Ticks(angles.map(|angles| angles.iter().map(ticks).collect())),
             false => WheelLog::Angles(angles),
         };
-        let odometry = Odometry { t_s, wheels, ..Odometry::default() };
+        let odometry = Odometry { t_s: t_s.into(), wheels, ..Odometry::default() };
         Run { info, odometry, truth, point_readings, wheel_reference, ..Run::default() }
     }
 

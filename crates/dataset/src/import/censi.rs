@@ -95,7 +95,7 @@ pub(super) fn open(source: &Path) -> Result<Vec<Source>, DatasetError> {
     let name = source.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let info =
         RunInfo { id: "run-01".to_owned(), protocol: Some(Protocol::Free), continuous: false, ..RunInfo::default() };
-    let odometry = Odometry { t_s: times_s, wheels: WheelLog::Ticks(ticks), ..Odometry::default() };
+    let odometry = Odometry { t_s: times_s.into(), wheels: WheelLog::Ticks(ticks), ..Odometry::default() };
     let header = Dataset {
         provenance: provenance(&name),
         robot: NominalRobot {
@@ -233,7 +233,7 @@ mod tests {
         let content = format!("{}{}\n\n{}\n", tuple(0.5, 100.0, -7.0), tuple(0.25, 200.0, 3.0), tuple(1.0, 0.0, 1.0));
         let dataset = import(content.as_bytes()).expect("three objects");
         let run = &dataset.runs[0];
-        assert_eq!(run.odometry.t_s, [0.0, 0.5, 0.75, 1.75]);
+        assert_eq!(*run.odometry.t_s, [0.0, 0.5, 0.75, 1.75]);
         let ticks = Wheels { left: vec![0, 100, 300, 300], right: vec![0, -7, -4, -3] };
         assert_eq!(run.odometry.wheels, WheelLog::Ticks(ticks));
         let second = Displacement { t0_s: 0.5, t1_s: 0.75, dx_m: 0.1, dy_m: 0.2, dtheta_rad: 0.3 };

@@ -216,7 +216,7 @@ fn read_run(id: &str, file: &Path, metadata: &Metadata) -> Result<Run, DatasetEr
         info.protocol = Some(protocol);
         info.settings = settings;
     }
-    let odometry = Odometry { t_s: times_s, wheels: WheelLog::Ticks(ticks), ..Odometry::default() };
+    let odometry = Odometry { t_s: times_s.into(), wheels: WheelLog::Ticks(ticks), ..Odometry::default() };
     Ok(Run { info, odometry, truth, ..Run::default() })
 }
 

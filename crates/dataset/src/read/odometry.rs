@@ -167,13 +167,14 @@ impl OdometryTable {
 
 impl Columns {
     fn empty(&self, rows: usize) -> Odometry {
-        Odometry { t_s: exactly(rows), wheels: self.form.empty_log(rows), extra: BTreeMap::default() }
+        Odometry { t_s: exactly(rows).into(), wheels: self.form.empty_log(rows), extra: BTreeMap::default() }
     }
 
     /// Adds a row to a run that will have `rows`.
     fn push(&self, odometry: &mut Odometry, row: &Row<'_>, rows: usize) -> Result<(), DatasetError> {
         let first = odometry.t_s.is_empty();
-        odometry.t_s.push(row.time_after(self.t_s, odometry.t_s.last().copied())?);
+        let t_s = row.time_after(self.t_s, odometry.t_s.last().copied())?;
+        odometry.t_s.push(t_s);
         match &mut odometry.wheels {
             WheelLog::Ticks(ticks) => {
                 ticks.left.push(row.count(self.wheels[0])?);

@@ -231,7 +231,7 @@ mod tests {
         let run = Run {
             info: RunInfo { id: "a".into(), ..RunInfo::default() },
             odometry: Odometry {
-                t_s: vec![0.0, 0.1],
+                t_s: vec![0.0, 0.1].into(),
                 wheels: WheelLog::Ticks(Wheels { left: vec![0, 5], right: vec![0, 7] }),
                 ..Odometry::default()
             },

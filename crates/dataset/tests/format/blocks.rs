@@ -63,7 +63,7 @@ fn parts_of_runs_are_slices_of_the_whole_in_any_order() {
         let rows = of.start * Blocks::ROWS..(of.end * Blocks::ROWS + 1).min(run.odometry.t_s.len());
         let rows = if all { 0..run.odometry.t_s.len() } else { rows };
         assert_eq!(part.info, run.info);
-        assert_eq!(part.odometry.t_s, run.odometry.t_s[rows.clone()]);
+        assert_eq!(*part.odometry.t_s, run.odometry.t_s[rows.clone()]);
         let (WheelLog::Ticks(found), WheelLog::Ticks(ticks)) = (&part.odometry.wheels, &run.odometry.wheels) else {
             panic!("ticks were written");
         };

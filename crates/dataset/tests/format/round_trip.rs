@@ -81,7 +81,7 @@ fn odometry(form: Form) -> impl Strategy<Value = Odometry> {
         (times(rows), wheels(form, rows), channel(), channel(), channel()).prop_map(|(t_s, wheels, a, b, c)| {
             let extra =
                 ExtraChannel::ALL.into_iter().zip([a, b, c]).filter_map(|(channel, values)| Some((channel, values?)));
-            Odometry { t_s, wheels, extra: extra.collect() }
+            Odometry { t_s: t_s.into(), wheels, extra: extra.collect() }
         })
     })
 }

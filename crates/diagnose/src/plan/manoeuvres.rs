@@ -219,7 +219,7 @@ pub(crate) fn planned_run(
         run.truth = poses.iter().map(|(t_s, pose)| TruthSample::new(*t_s, pose.x_m, pose.y_m, heading(pose))).collect();
     }
     let wheels = if setting.twist { twist(&log, setting)? } else { WheelLog::Angles(log.angle_rad) };
-    run.odometry = Odometry { t_s: log.t_s, wheels, ..Odometry::default() };
+    run.odometry = Odometry { t_s: log.t_s.into(), wheels, ..Odometry::default() };
     Some(run)
 }
 

@@ -9,7 +9,7 @@
 //! Alias: `missed_counts`.
 //! Reference: serial links without acknowledgement, full queues.
 
-use dataset::{Dataset, Odometry, Run, SamplingPeriod, UnknownMotion, WheelLog};
+use dataset::{Dataset, Odometry, Run, Timestamps, UnknownMotion, WheelLog};
 use kinematics::{Side, Wheels};
 use serde::{Deserialize, Serialize};
 
@@ -116,8 +116,8 @@ struct Missing {
 
 /// Rows from each row to the next: more than one where rows are missing between them. By the beat, as stamps
 /// may jitter, and whether that is uncertain; by time where there is none. One that came by itself is none.
-fn rows_after(t_s: &[f64]) -> Option<(Vec<f64>, bool)> {
-    if let Some(period) = SamplingPeriod::of(t_s) {
+fn rows_after(t_s: &Timestamps) -> Option<(Vec<f64>, bool)> {
+    if let Some(period) = t_s.sampling_period() {
         // Where some numbers of rows are wrong, the log alone shows nothing.
         let uncertain = !period.is_certain();
         return Some((period.numbers.windows(2).map(|pair| (pair[1] - pair[0]) as f64).collect(), uncertain));
@@ -253,7 +253,7 @@ mod tests {
             last = count;
         }
         let wheels = WheelLog::Ticks(Wheels { left: column.clone(), right: column });
-        (Odometry { t_s, wheels, ..Odometry::default() }, whole)
+        (Odometry { t_s: t_s.into(), wheels, ..Odometry::default() }, whole)
     }
 
     #[test]

@@ -13,7 +13,7 @@
 //! Reference: stamps given on receipt, by a scheduler that is late, of readings that a timer takes;
 //! milliseconds.
 
-use dataset::{Dataset, SamplingPeriod, WheelLog};
+use dataset::{Dataset, Timestamps, WheelLog};
 use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::Pose;
 use serde::{Deserialize, Serialize};
@@ -132,7 +132,7 @@ fn restamped(dataset: &Dataset, share: f64, sigma: f64) -> Option<Dataset> {
             continue;
         }
         if let Some((read_s, says)) = read_times(&run.odometry.t_s, share, sigma) {
-            run.odometry.t_s = read_s;
+            run.odometry.t_s = read_s.into();
             run.odometry.retain_rows(&says);
             has_beat = true;
         }
@@ -143,12 +143,12 @@ fn restamped(dataset: &Dataset, share: f64, sigma: f64) -> Option<Dataset> {
 /// When rows were read that have these stamps, and which rows say when. A row of a tick was read nearer to
 /// the beat by the false share; one that came by itself has no beat to say when but its stamp. Where stamps
 /// are later than a tick can be told by, none of several rows of one tick says when.
-fn read_times(stamps_s: &[f64], share: f64, sigma: f64) -> Option<(Vec<f64>, Vec<bool>)> {
+fn read_times(stamps_s: &Timestamps, share: f64, sigma: f64) -> Option<(Vec<f64>, Vec<bool>)> {
     if share <= 0.0 {
         return None;
     }
     let share = if (share - 1.0).abs() <= WHOLE_SHARE_SIGMAS * sigma { 1.0 } else { share.min(1.0) };
-    let period = SamplingPeriod::of(stamps_s)?;
+    let period = stamps_s.sampling_period()?;
     let is_certain = period.is_certain();
     let mut says: Vec<bool> = (0..stamps_s.len()).map(|row| is_certain || period.is_alone(row)).collect();
     // The ends of a run stay: what was measured there is compared with them.
@@ -179,7 +179,7 @@ fn share_by_counts(datasets: &[Dataset]) -> Option<(f64, f64)> {
     let mut rows: Vec<(f64, f64)> = Vec::new();
     for run in runs {
         let stamps_s = &run.odometry.t_s;
-        let Some(period) = SamplingPeriod::of(stamps_s).filter(|period| period.is_bunched) else { continue };
+        let Some(period) = stamps_s.sampling_period().filter(|period| period.is_bunched) else { continue };
         let read_s: Vec<f64> = stamps_s.iter().zip(&period.late_s).map(|(stamp_s, late_s)| stamp_s - late_s).collect();
         let columns = match &run.odometry.wheels {
             WheelLog::Ticks(ticks) => ticks.as_ref().map(|column| column.iter().map(|count| *count as f64).collect()),
@@ -308,13 +308,13 @@ mod tests {
         };
         // The line through 501 rows is off by 1 ms/√501 on average, by twice that at the ends of a run.
         // Rejects the stamps as they are, 1 ms off.
-        let (whole, _) = read_times(&stamped(1.0), 0.96, 0.02).expect("a beat");
+        let (whole, _) = read_times(&stamped(1.0).into(), 0.96, 0.02).expect("a beat");
         assert!(off_s(&whole, 0.0) < 1e-4, "{}", off_s(&whole, 0.0));
         // A share that is surely half leaves the other half, which is true.
-        let (half, says) = read_times(&stamped(1.0), 0.5, 0.02).expect("a beat");
+        let (half, says) = read_times(&stamped(1.0).into(), 0.5, 0.02).expect("a beat");
         assert!(off_s(&half, 0.5) < 1e-4, "{}", off_s(&half, 0.5));
         assert!(says.iter().all(|says| *says), "each row has its tick");
-        assert!(read_times(&stamped(1.0), -0.9, 0.02).is_none(), "speeds that were logged have true stamps");
+        assert!(read_times(&stamped(1.0).into(), -0.9, 0.02).is_none(), "speeds that were logged have true stamps");
     }
 
     #[test]
@@ -337,7 +337,7 @@ mod tests {
         let share = |at_s: &[f64]| {
             let mut run = dataset::Run::default();
             run.info.continuous = true;
-            run.odometry.t_s.clone_from(&stamps_s);
+            run.odometry.t_s = stamps_s.clone().into();
             run.odometry.wheels = WheelLog::Ticks(kinematics::Wheels::both(counted(at_s)));
             share_by_counts(&[Dataset { runs: vec![run], ..empty() }]).expect("rows in bunches")
         };

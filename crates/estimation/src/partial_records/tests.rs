@@ -15,7 +15,7 @@ fn run(rows: &[(f64, [f64; 2], f64)]) -> Run {
         angles.left.push(angles.left[row] + left);
         angles.right.push(angles.right[row] + right);
     }
-    let mut odometry = Odometry { t_s, wheels: WheelLog::Angles(angles), ..Odometry::default() };
+    let mut odometry = Odometry { t_s: t_s.into(), wheels: WheelLog::Angles(angles), ..Odometry::default() };
     odometry.extra.insert(ExtraChannel::GyroYawRate, rates);
     Run { info: RunInfo { continuous: true, ..RunInfo::default() }, odometry, ..Run::default() }
 }

@@ -98,7 +98,7 @@ fn a_long_ellipse_pulls_along_its_short_axis_alone() {
         let mut dataset = dataset_of(1, true);
         let travel_rad = 1.0 / 0.08;
         let run = &mut dataset.runs[0];
-        run.odometry.t_s = vec![0.0, 1.0];
+        run.odometry.t_s = vec![0.0, 1.0].into();
         run.odometry.wheels = WheelLog::Angles(Wheels::both(vec![0.0, travel_rad]));
         run.truth =
             vec![TruthSample::new(0.0, 0.0, 0.0, Some(0.0)), TruthSample::new(1.0, 1.0 + off[0], off[1], Some(0.0))];

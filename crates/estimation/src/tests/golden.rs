@@ -47,7 +47,7 @@ pub(super) fn dense() -> Dataset {
             pose = pose * Increment::from_travel(travel_m, 0.366).arc();
             turned = turned.zip_with(step_rad, |turned, step| turned + step);
         }
-        run.odometry.t_s = t_s;
+        run.odometry.t_s = t_s.into();
         run.odometry.wheels = WheelLog::Ticks(ticks);
         run.truth = truth;
     }

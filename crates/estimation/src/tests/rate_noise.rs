@@ -13,7 +13,7 @@ fn driven(rad: f64) -> Dataset {
     let ticks = Wheels { left: counts(0.7), right: counts(0.9) };
     log.robot.ticks_per_rev = Some(std::f64::consts::TAU / rad);
     log.runs[0].truth = (0..400).map(|s| TruthSample::new(f64::from(s), 0.0, 0.0, Some(0.0))).collect();
-    log.runs[0].odometry = Odometry { t_s, wheels: WheelLog::Ticks(ticks), ..Odometry::default() };
+    log.runs[0].odometry = Odometry { t_s: t_s.into(), wheels: WheelLog::Ticks(ticks), ..Odometry::default() };
     log
 }
 

@@ -126,7 +126,7 @@ fn a_sensors_heading_is_that_between_measured_and_dead_reckoned_motions() {
         let (left, right) =
             (vec![0.0, 10.0, 10.0 - spin_rad, 30.0 - spin_rad], vec![0.0, 10.0, 10.0 + spin_rad, 30.0 + spin_rad]);
         let run = &mut dataset.runs[0];
-        run.odometry.t_s = vec![0.0, 1.0, 2.0, 3.0];
+        run.odometry.t_s = vec![0.0, 1.0, 2.0, 3.0].into();
         run.odometry.wheels = WheelLog::Angles(Wheels { left, right });
         let quarter = 0.5 * std::f64::consts::PI;
         let poses = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 0.0, quarter), (1.0, 2.0, quarter)];
@@ -175,7 +175,7 @@ fn arcs_count_for_a_sensors_heading_by_their_chords_and_loops_do_not() {
     let found = |turn_rad: f64, length_m: f64| {
         let mut dataset = dataset_of(1, true);
         let run = &mut dataset.runs[0];
-        run.odometry.t_s = vec![0.0, 1.0, 2.0];
+        run.odometry.t_s = vec![0.0, 1.0, 2.0].into();
         let (left, right) = (length_m - 0.2 * turn_rad, length_m + 0.2 * turn_rad);
         let angles = Wheels { left: vec![0.0, 10.0, 10.0 + 10.0 * left], right: vec![0.0, 10.0, 10.0 + 10.0 * right] };
         run.odometry.wheels = WheelLog::Angles(angles);

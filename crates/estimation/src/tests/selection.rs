@@ -195,7 +195,7 @@ fn logged_finer(dataset: &Dataset, times: usize) -> Dataset {
             steps.chain(of.last().copied()).collect()
         };
         let (t_s, angles) = (between(&run.odometry.t_s), angles.as_ref().map(|of| between(&off_grid(of))));
-        (run.odometry.t_s, run.odometry.wheels) = (t_s, WheelLog::Angles(angles));
+        (run.odometry.t_s, run.odometry.wheels) = (t_s.into(), WheelLog::Angles(angles));
     }
     finer
 }

@@ -4,7 +4,7 @@ use super::*;
 use dataset::{Dataset, Odometry, Provenance, Run, RunInfo, TruthNoise};
 
 fn dataset(wheels: WheelLog, continuous: bool) -> Dataset {
-    let odometry = Odometry { t_s: vec![0.0, 1.0, 2.0, 4.0], wheels, ..Odometry::default() };
+    let odometry = Odometry { t_s: vec![0.0, 1.0, 2.0, 4.0].into(), wheels, ..Odometry::default() };
     let run = Run { info: RunInfo { continuous, ..RunInfo::default() }, odometry, ..Run::default() };
     Dataset {
         provenance: Provenance::default(),
@@ -49,7 +49,7 @@ fn within_short_rows_wheels_speed_up_where_their_neighbours_do() {
     let left: Vec<f64> = t_s.iter().map(|t_s| 10.0 * t_s * t_s).collect();
     let right: Vec<f64> = t_s.iter().map(|t_s| f64::max(10.0 * (t_s - 0.3), 0.0)).collect();
     let mut dataset = dataset(WheelLog::Angles(Wheels { left, right }), true);
-    dataset.runs[0].odometry.t_s = t_s;
+    dataset.runs[0].odometry.t_s = t_s.into();
     let session = dataset.session();
     let track = WheelAngleInterpolator::of(&session.runs[0], session.robot).expect("a track");
     let steps = track.steps(0.25, 0.35).expect("spanned");
@@ -67,7 +67,7 @@ fn a_long_row_is_off_by_all_of_its_acceleration() {
     let t_s = vec![0.0, 0.2, 0.4, 0.6, 1.0, 1.2, 1.4, 1.6];
     let angle: Vec<f64> = t_s.iter().map(|t_s| 10.0 * t_s * t_s).collect();
     let mut dataset = dataset(WheelLog::Angles(Wheels { left: angle.clone(), right: angle }), true);
-    dataset.runs[0].odometry.t_s = t_s;
+    dataset.runs[0].odometry.t_s = t_s.into();
     let session = dataset.session();
     let track = WheelAngleInterpolator::of(&session.runs[0], session.robot).expect("a track");
     let (turned, variance) = (track.cursor().angle_rad(0.8), track.interpolated_rad2(3, 0.8));

@@ -69,7 +69,7 @@ pub(super) fn run(
     }
     let start_s = session_start.map(|session| seconds(session, raw.start));
     let info = RunInfo { id: raw.id.clone(), start_s, ..RunInfo::default() };
-    Ok(Run { info, odometry: Odometry { t_s, wheels, ..Odometry::default() }, truth, ..Run::default() })
+    Ok(Run { info, odometry: Odometry { t_s: t_s.into(), wheels, ..Odometry::default() }, truth, ..Run::default() })
 }
 
 fn counts(part: &Part, side: Quantity, raw: &RawRun, column: &[f64]) -> Result<Vec<i64>, DatasetError> {

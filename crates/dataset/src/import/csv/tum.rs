@@ -289,7 +289,7 @@ mod tests {
         let path = path();
         let found = read(&tum(&path), &tum(&path)).expect("a dataset");
         let run = &found.imported.dataset.runs[0];
-        assert_eq!(run.odometry.t_s, [0.0, 2.0, 4.0, 6.0]);
+        assert_eq!(*run.odometry.t_s, [0.0, 2.0, 4.0, 6.0]);
         assert_eq!(run.truth.len(), 4);
         let WheelLog::Twist { v_mps, omega_radps } = &run.odometry.wheels else { panic!("twists") };
         // Half a metre ahead and to the left lies along 45°: √½ m in 2 s.
