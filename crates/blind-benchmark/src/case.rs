@@ -15,7 +15,7 @@ use super::draw::{CaseDraws, Draw};
 use super::drive::{DriveContext, HELD_OUT_RUN, OTHER_SESSION, PLANNED, drive, mean_square_motion};
 use super::hidden::{EffectKind, Hidden, hideable};
 use super::instrument::InstrumentModel;
-use super::oracle::{Detectability, TrueNoise};
+use super::oracle::{Asked, Detectability, TrueNoise};
 use super::power::DISCRIMINATION_LEVEL;
 use super::robot::{RandomRobot, SessionPlan};
 use crate::error::ChallengeError;
@@ -179,15 +179,15 @@ impl Case {
         let noise = TrueNoise::of(&conditions, &instrument_model, mean_square_motion(&plain));
         let (mut detectability, mut rounding_shares) = (Vec::new(), Vec::new());
         for effect in &mut hidden {
-            let measured = |effect: &Hidden, noise: TrueNoise| -> Result<Option<Detectability>, ChallengeError> {
+            let measured = |effect: &Hidden, noise: TrueNoise, asked: Asked<'_>| {
                 let exact = drive(&robot.sessions, &measurement, &[effect], false, 0)?;
-                Ok(Detectability::of(&cut_into_runs(exact, &stops), &plain, &truth, noise))
+                Ok(Detectability::of(&cut_into_runs(exact, &stops), &plain, &truth, noise, asked))
             };
-            match scale(effect, &mut draw, ratios, |effect| measured(effect, noise))? {
+            match scale(effect, &mut draw, ratios, |effect, asked| measured(effect, noise, asked))? {
                 Chosen::RecordFault => detectability.push(None),
                 Chosen::Detectability(found) => detectability.push(Some(*found)),
                 Chosen::Undetectable => {
-                    return Ok(match measured(effect, noise.without_rounding()) {
+                    return Ok(match measured(effect, noise.without_rounding(), Asked::One(effect.id)) {
                         Ok(Some(unrounded)) if is_unresolved(effect, &unrounded, noise) => Attempt::Unresolved,
                         _ => Attempt::Undetectable,
                     });
@@ -195,7 +195,7 @@ impl Case {
             }
             rounding_shares.push(match detectability.last() {
                 Some(Some(found)) if noise.has_rounding() => {
-                    measured(effect, noise.without_rounding())?.map(|unrounded| {
+                    measured(effect, noise.without_rounding(), Asked::One(effect.id))?.map(|unrounded| {
                         1.0 - known_noncentrality(effect, found) / known_noncentrality(effect, &unrounded)
                     })
                 }
@@ -205,7 +205,7 @@ impl Case {
         let all: Vec<&Hidden> = hidden.iter().collect();
         let both = if hidden.len() == 2 {
             let exact = drive(&robot.sessions, &measurement, &all, false, 0)?;
-            Detectability::of(&exact, &plain, &truth, noise)
+            Detectability::of(&exact, &plain, &truth, noise, Asked::All)
         } else {
             None
         };
@@ -261,7 +261,7 @@ impl Case {
             all.extend(drive(plans, &measurement, hidden, false, PLANNED)?);
             Ok(all)
         };
-        let Some(detectability) = Detectability::of(&all(&[effect])?, &all(&[])?, &truth, self.noise) else {
+        let Some(detectability) = Detectability::of(&all(&[effect])?, &all(&[])?, &truth, self.noise, Asked::All) else {
             return Ok(None);
         };
         let rivals = detectability.rivals(effect.id, known_noncentrality(effect, &detectability));
@@ -318,13 +318,14 @@ fn scale(
     effect: &mut Hidden,
     draw: &mut Draw,
     (low, high): (f64, f64),
-    measured: impl Fn(&Hidden) -> Result<Option<Detectability>, ChallengeError>,
+    measured: impl Fn(&Hidden, Asked<'_>) -> Result<Option<Detectability>, ChallengeError>,
 ) -> Result<Chosen, ChallengeError> {
     if effect.kind == EffectKind::RecordFault {
         return Ok(Chosen::RecordFault);
     }
     effect.scale = effect.most.min(1.0);
-    let Some(first) = measured(effect)? else { return Ok(Chosen::Undetectable) };
+    let of_size = |effect: &Hidden| measured(effect, Asked::One(effect.id));
+    let Some(first) = of_size(effect)? else { return Ok(Chosen::Undetectable) };
     let at_first = size_ratio(effect, &first);
     // The largest that a real robot may have must reach the limit, or the paths do not show the effect.
     let most = at_first * effect.most / effect.scale;
@@ -332,43 +333,46 @@ fn scale(
         return Ok(Chosen::Undetectable);
     }
     let wanted = draw.log_uniform(low, high.min(most));
-    let mut found = (first, at_first);
+    let mut found = at_first;
     // How fast the ratio grows with the scale: as its first power, until two points say otherwise.
     let mut growth = 1.0_f64;
     for _ in 0..MAX_STEPS {
-        let off = wanted / found.1;
+        let off = wanted / found;
         if (1.0 / MAX_RATIO_ERROR.sqrt()..=MAX_RATIO_ERROR.sqrt()).contains(&off) {
             break;
         }
-        let before = (effect.scale, found.1);
+        let before = (effect.scale, found);
         effect.scale = (effect.scale * off.powf(1.0 / growth).clamp(1e-3, 1e3)).min(effect.most);
         if effect.act().is_none() {
             return Ok(Chosen::Undetectable);
         }
-        let Some(next) = measured(effect)? else { return Ok(Chosen::Undetectable) };
+        let Some(next) = of_size(effect)? else { return Ok(Chosen::Undetectable) };
         let at_next = size_ratio(effect, &next);
         if at_next.is_nan() || at_next <= 0.0 {
             return Ok(Chosen::Undetectable);
         }
         let slope = (at_next / before.1).ln() / (effect.scale / before.0).ln();
         growth = if slope.is_finite() { slope.clamp(0.3, 6.0) } else { 1.0 };
-        found = (next, at_next);
+        found = at_next;
     }
-    let off = wanted / found.1;
+    let off = wanted / found;
     let close = (1.0 / MAX_RATIO_ERROR..=MAX_RATIO_ERROR).contains(&off);
+    if !close {
+        return Ok(Chosen::Undetectable);
+    }
+    let Some(found) = measured(effect, Asked::All)? else { return Ok(Chosen::Undetectable) };
     // A form that another name's hypothesis describes better is, to whoever has these hypotheses, that other
     // effect.
     let described_better = || {
         found
-            .0
-            .rivals(effect.id, known_noncentrality(effect, &found.0))
+            .rivals(effect.id, known_noncentrality(effect, &found))
             .first()
             .is_some_and(|(_, left)| *left < -DISCRIMINATION_LEVEL)
     };
-    let of_its_kind = !effect.other_form || (form_share(effect, &found.0) > MIN_SHARE && !described_better());
-    let of_its_own = effect.kind == EffectKind::Scatter || !found.0.is_explained_by_geometry();
-    if close && of_its_kind && of_its_own {
-        Ok(Chosen::Detectability(Box::new(found.0)))
+    let of_its_kind = !effect.other_form || (form_share(effect, &found) > MIN_SHARE && !described_better());
+    let of_its_own = effect.kind == EffectKind::Scatter || !found.is_explained_by_geometry();
+    if of_its_kind && of_its_own {
+        Ok(Chosen::Detectability(Box::new(found)))
     } else {
         Ok(Chosen::Undetectable)
     }
@@ -429,7 +433,7 @@ impl Trial {
             let mut noncentrality = 0.0;
             for _ in 0..4 {
                 let exact = drive(&robot.sessions, &measurement, &[&hidden], false, 0)?;
-                let Some(detectability) = Detectability::of(&exact, &plain, &truth, noise) else { return Ok(None) };
+                let Some(detectability) = Detectability::of(&exact, &plain, &truth, noise, Asked::All) else { return Ok(None) };
                 noncentrality = detectability.noncentrality_in_form(hidden.id);
                 let off = size_ratio(&hidden, &detectability);
                 if (0.99..1.01).contains(&off) {
@@ -458,7 +462,7 @@ impl Trial {
         let measurement = DriveContext { seed: *seed, number, conditions, robot, instrument_model, instrument: None };
         let all = [&self.hidden];
         let data = drive(&robot.sessions, &measurement, if hidden { &all } else { &[] }, true, 0)?;
-        let detectability = Detectability::of(&data, &self.plain, &self.truth, self.noise);
+        let detectability = Detectability::of(&data, &self.plain, &self.truth, self.noise, Asked::All);
         Ok(detectability.map_or(0.0, |detectability| detectability.statistic(self.hidden.id)))
     }
 }

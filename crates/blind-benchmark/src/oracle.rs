@@ -39,6 +39,15 @@ struct Candidate {
     columns: std::ops::Range<usize>,
 }
 
+/// Which names noise-free runs are asked for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Asked<'n> {
+    /// All of the catalogue: to see which of them are told from each other.
+    All,
+    /// One: to see how large its effect is.
+    One(&'n str),
+}
+
 /// What noise-free runs show at the true drive.
 pub(crate) struct Detectability {
     /// At the geometry parameters that a calibration without the effect would find: a turn lost all along a
@@ -238,18 +247,23 @@ fn scatter(z: &[((usize, usize), f64)]) -> f64 {
 }
 
 impl Detectability {
-    /// Noise-free runs under every effect's estimation model. `without` are the same runs without the
+    /// Noise-free runs under the estimation models of the effects that are asked for. `without` are the same runs without the
     /// effect: what they show, rounded counts and measurements between two rows, is not the effect's.
     pub(crate) fn of(
         datasets: &[Dataset],
         without: &[Dataset],
         truth: &DriveGeometry,
         noise: TrueNoise,
+        asked: Asked<'_>,
     ) -> Option<Self> {
         let mut terms: Vec<Box<dyn ModelTerm>> = Vec::new();
         let mut candidates = Vec::new();
         let mut at = Column::BASE.len();
-        for id in CATALOGUE {
+        let is_asked = |id: &str| match asked {
+            Asked::All => true,
+            Asked::One(one) => one == id,
+        };
+        for id in CATALOGUE.into_iter().filter(|id| is_asked(id)) {
             let Some(variants) = hypothesis(id).and_then(Hypothesis::into_variants) else { continue };
             for variant in variants {
                 let parameters = variant.term.parameters().to_vec();
