@@ -22,7 +22,7 @@ const SQUARES: Schedule = Schedule::Squares { side_m: 1.0, runs_each_way: 3 };
 const CIRCLES: Schedule = Schedule::Circles { radius_m: 0.6, turns: None, runs_each_way: 4 };
 
 fn planned(datasets: &[Dataset], limits: Limits) -> Document {
-    diagnose(datasets, &Options { limits, ..Options::default() }).expect("a diagnosis").document
+    diagnose(datasets, &Options { limits: Some(limits), ..Options::default() }).expect("a diagnosis").document
 }
 
 fn names(document: &Document) -> Vec<String> {
@@ -124,7 +124,7 @@ fn plans_for_random_robots_name_nothing_wrong() {
     for case in 0..cases {
         let (id, hidden) = drawn(case);
         let first = simulated(&hidden, 61_000 + case);
-        let Ok(found) = diagnose(std::slice::from_ref(&first), &Options { limits: ROOM, ..Options::default() }) else {
+        let Ok(found) = diagnose(std::slice::from_ref(&first), &Options { limits: Some(ROOM), ..Options::default() }) else {
             continue;
         };
         let found = found.document;

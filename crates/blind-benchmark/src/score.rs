@@ -22,7 +22,7 @@ pub(crate) fn score(number: u64, case: &Case, scope: Scope) -> Result<CaseResult
         CaseKind::LeftOut => case.hidden.iter().map(|hidden| hidden.id.to_owned()).collect(),
         _ => Vec::new(),
     };
-    let diagnosed = diagnose(&case.datasets, &Options { without, ..Options::default() });
+    let diagnosed = diagnose(&case.datasets, &Options { without, limits: None, ..Options::default() });
     let counts = [
         case.datasets.len(),
         case.datasets.iter().map(|dataset| dataset.runs.len()).sum(),
@@ -54,7 +54,7 @@ pub(crate) fn score(number: u64, case: &Case, scope: Scope) -> Result<CaseResult
         planned: None,
     };
     if scope == Scope::OneLog {
-        let of_cut = diagnose(&case.cut(), &Options::default());
+        let of_cut = diagnose(&case.cut(), &Options { limits: None, ..Options::default() });
         let of_cut = of_cut.map_or_else(|_| Vec::new(), |diagnosis| reported(&diagnosis.document, case));
         result.reported_of_cut = Some(of_cut);
     }

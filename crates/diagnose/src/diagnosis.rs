@@ -33,14 +33,20 @@ use crate::text;
 use crate::unknown_motion::unknown_motions;
 
 /// What to leave out of the catalogue, and the limits of the next experiment.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Options {
     /// Effects that are not to be named, by id.
     pub without: Vec<String>,
-    /// Floor, time and speed within which the next experiment is sought.
-    pub limits: Limits,
+    /// Floor, time and speed within which the next experiment is sought; `None`: none is sought.
+    pub limits: Option<Limits>,
     /// What is told when a stage begins: a large log takes minutes.
     pub on_stage: OnStage,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { without: Vec::new(), limits: Some(Limits::default()), on_stage: OnStage::default() }
+    }
 }
 
 /// Why there is no diagnosis.
@@ -268,8 +274,12 @@ fn stages(
     begins(Step::Detectability);
     let (sensitivity, blind_to) = detectability(model, &catalogue, &mut structure.found.known.clone());
     begins(Step::NextExperiment);
-    let next =
-        next_experiment(records, (&structure.base, &structure.found), (model, &catalogue, &blind_to), &options.limits);
+    let next = match &options.limits {
+        None => Err("none was sought".to_owned()),
+        Some(limits) => {
+            next_experiment(records, (&structure.base, &structure.found), (model, &catalogue, &blind_to), limits)
+        }
+    };
     let carried = carried(&structure.base, model, &findings);
     let extended = crate::extended_scenario::scenario_of(records, &datasets[0].robot, &faults, stamps, &carried);
     begins(Step::Residuals);

@@ -46,12 +46,13 @@ fn of_level(
     level: GainLevel,
     options: &Options,
 ) -> Result<NestedGain, DiagnoseError> {
+    let options = Options { limits: None, ..options.clone() };
     let (mut all, mut held_out): (EndErrors, Vec<HeldOutUnit>) = (EndErrors::default(), Vec::new());
     for (number, name) in units.names.iter().enumerate() {
         let unit = HeldOutUnit { unit: name.clone(), found: None, why_null: None, final_position_m: None };
         let sessions = datasets.iter().enumerate();
         let rest: Vec<Dataset> = sessions.filter_map(|session| Some(part(session, units, number, false)?.1)).collect();
-        held_out.push(match diagnose(&rest, options) {
+        held_out.push(match diagnose(&rest, &options) {
             Err(error @ DiagnoseError::UnknownEffect { .. }) => return Err(error),
             Err(error) => HeldOutUnit { why_null: Some(error.to_string()), ..unit },
             Ok(diagnosis) => match end_errors(datasets, units, number, &diagnosis) {
