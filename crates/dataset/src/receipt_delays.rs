@@ -89,15 +89,21 @@ impl Delays {
         let mut delay = rows.late[row] - cell * beam.first as f64;
         let (mut free, growth) = ((-delay / self.mean).exp(), (cell / self.mean).exp());
         let (ready, of_early) = ((-EARLY / self.mean).exp(), -(-EARLY / self.mean).exp_m1());
-        for share in &mut beam.shares {
-            *share *= match (delay < 0.0, rows.held_up[row]) {
-                (false, true) => 1.0 - ready * free,
-                (false, false) => free / self.mean,
-                (true, true) => of_early * (delay / EARLY).exp(),
-                (true, false) => (delay / EARLY).exp() / self.mean,
-            };
+        let held_up = rows.held_up[row];
+        let mut shares = beam.shares.iter_mut();
+        while delay >= 0.0
+            && let Some(share) = shares.next()
+        {
+            *share *= if held_up { 1.0 - ready * free } else { free / self.mean };
             delay -= cell;
             free *= growth;
+        }
+        // exp(delay/EARLY) falls likewise.
+        let (mut early, decay) = ((delay / EARLY).exp(), (-cell / EARLY).exp());
+        let of_early = if held_up { of_early } else { self.mean.recip() };
+        for share in shares {
+            *share *= of_early * early;
+            early *= decay;
         }
     }
 

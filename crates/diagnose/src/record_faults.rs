@@ -72,7 +72,7 @@ pub(crate) fn fault(
             }
             // By all measurements of the records: those that are not compared later count here.
             let compared = with_unknown_motion_of(datasets, &records);
-            let Ok(fit) = PLAIN.fit(&sessions(&compared)) else { continue };
+            let Ok(fit) = PLAIN.fit_to_compare(&sessions(&compared)) else { continue };
             // Records that no plausible drive follows, rewritten or not, say nothing of the fault, unless
             // they show it by themselves. What was lost is not restored to the last count: measurements may
             // still lie off, but far fewer of them.

@@ -38,6 +38,14 @@ impl FitSettings {
         self.fit_until(ConvergenceCriterion::NoiseShare(NOISE_STEP_TOLERANCE), sessions)
     }
 
+    /// The same, ended where the likelihood hardly changes any more: to compare models by.
+    ///
+    /// # Errors
+    /// As [`Self::fit`].
+    pub fn fit_to_compare<'a>(&self, sessions: &[Session<'a>]) -> Result<ModelFit<'a>, EstimationError> {
+        self.fit_until(ConvergenceCriterion::Likelihood, sessions)
+    }
+
     /// The fit, with its criterion of convergence.
     pub(crate) fn fit_until<'a>(
         &self,
