@@ -124,7 +124,8 @@ fn plans_for_random_robots_name_nothing_wrong() {
     for case in 0..cases {
         let (id, hidden) = drawn(case);
         let first = simulated(&hidden, 61_000 + case);
-        let Ok(found) = diagnose(std::slice::from_ref(&first), &Options { limits: Some(ROOM), ..Options::default() }) else {
+        let Ok(found) = diagnose(std::slice::from_ref(&first), &Options { limits: Some(ROOM), ..Options::default() })
+        else {
             continue;
         };
         let found = found.document;

@@ -261,7 +261,8 @@ impl Case {
             all.extend(drive(plans, &measurement, hidden, false, PLANNED)?);
             Ok(all)
         };
-        let Some(detectability) = Detectability::of(&all(&[effect])?, &all(&[])?, &truth, self.noise, Asked::All) else {
+        let Some(detectability) = Detectability::of(&all(&[effect])?, &all(&[])?, &truth, self.noise, Asked::All)
+        else {
             return Ok(None);
         };
         let rivals = detectability.rivals(effect.id, known_noncentrality(effect, &detectability));
@@ -371,11 +372,7 @@ fn scale(
     };
     let of_its_kind = !effect.other_form || (form_share(effect, &found) > MIN_SHARE && !described_better());
     let of_its_own = effect.kind == EffectKind::Scatter || !found.is_explained_by_geometry();
-    if of_its_kind && of_its_own {
-        Ok(Chosen::Detectability(Box::new(found)))
-    } else {
-        Ok(Chosen::Undetectable)
-    }
+    if of_its_kind && of_its_own { Ok(Chosen::Detectability(Box::new(found))) } else { Ok(Chosen::Undetectable) }
 }
 
 /// Whether an effect at its scale would show, were it not for the rounding.
@@ -433,7 +430,9 @@ impl Trial {
             let mut noncentrality = 0.0;
             for _ in 0..4 {
                 let exact = drive(&robot.sessions, &measurement, &[&hidden], false, 0)?;
-                let Some(detectability) = Detectability::of(&exact, &plain, &truth, noise, Asked::All) else { return Ok(None) };
+                let Some(detectability) = Detectability::of(&exact, &plain, &truth, noise, Asked::All) else {
+                    return Ok(None);
+                };
                 noncentrality = detectability.noncentrality_in_form(hidden.id);
                 let off = size_ratio(&hidden, &detectability);
                 if (0.99..1.01).contains(&off) {

@@ -13,8 +13,8 @@ use kinematics::{DriveGeometry, Wheels, wrap_to_pi};
 
 use crate::log_rows::has_outlying_rows;
 use crate::settings::records::{
-    CLOCK_STEP_S, MAX_CLOCK_OFFSET_S, MAX_CLOCK_PAIRS, MAX_CLOCK_UNEXPLAINED, MIN_CLOCK_GAIN, MIN_CLOCK_OFFSET_S,
-    MIN_CLOCK_PAIRS, MIN_CLOCK_RUNS, MIN_CLOCK_SIGMAS, MIN_CLOCK_TURN_RAD, MIN_RUNS_PER_ODD_CLOCK,
+    CLOCK_STEP_S, MAX_CLOCK_OFFSET_S, MAX_CLOCK_PAIRS, MAX_CLOCK_UNEXPLAINED, MAX_RATE_AT_REST, MIN_CLOCK_GAIN,
+    MIN_CLOCK_OFFSET_S, MIN_CLOCK_PAIRS, MIN_CLOCK_RUNS, MIN_CLOCK_SIGMAS, MIN_CLOCK_TURN_RAD, MIN_RUNS_PER_ODD_CLOCK,
 };
 
 /// An offset of the instrument's clock: its poses are of so long before their stamps.
@@ -55,18 +55,13 @@ pub(crate) fn clock_offsets(datasets: &[Dataset], min_common_s: f64) -> Clocks {
             all.extend(profile.map(|profile| OfRun { run: (session, position), profile }));
         }
     }
-    let mut offsets_s: Vec<f64> = all.iter().map(|of| of.profile.offset_s).collect();
-    if offsets_s.is_empty() {
-        return Clocks::default();
-    }
-    offsets_s.sort_by(f64::total_cmp);
-    let middle_s = offsets_s[offsets_s.len() / 2];
+    let Some(common_s) = common_offset_s(&all) else { return Clocks::default() };
     let id = |(session, position): (usize, usize)| datasets[session].runs[position].info.id.clone();
     let is_odd = |of: &&OfRun| {
-        let apart_s = (of.profile.offset_s - middle_s).abs();
+        let apart_s = (of.profile.offset_s - common_s).abs();
         all.len() >= MIN_CLOCK_RUNS
-            && apart_s >= MIN_CLOCK_OFFSET_S.max(MIN_CLOCK_SIGMAS * of.profile.sigma_s)
-            && of.profile.gain_over(middle_s) > MIN_CLOCK_GAIN
+            && apart_s >= of.profile.tolerance_s()
+            && of.profile.gain_over(common_s) > MIN_CLOCK_GAIN
     };
     let odd: Vec<&OfRun> = all.iter().filter(is_odd).collect();
     // Where many runs have clocks of their own, none is the odd one: errors that are alike for seconds say so
@@ -77,27 +72,43 @@ pub(crate) fn clock_offsets(datasets: &[Dataset], min_common_s: f64) -> Clocks {
         runs: Some(vec![id(of.run)]),
         offset_s: of.profile.offset_s,
         sigma_s: of.profile.sigma_s,
-        gain: of.profile.gain_over(middle_s),
+        gain: of.profile.gain_over(common_s),
     };
     let mut offsets: Vec<ClockOffset> = odd.iter().map(own).collect();
-    let gain: f64 = all.iter().map(|of| of.profile.gain_over(0.0) - of.profile.gain_over(middle_s)).sum();
-    let is_common = middle_s.abs() >= min_common_s && gain > MIN_CLOCK_GAIN;
+    let gain: f64 = all.iter().map(|of| of.profile.gain_over(0.0) - of.profile.gain_over(common_s)).sum();
+    let is_common = common_s.abs() >= min_common_s && gain > MIN_CLOCK_GAIN;
     if is_common {
         let information: f64 = all.iter().map(|of| of.profile.sigma_s.powi(-2)).sum();
-        offsets.push(ClockOffset { runs: None, offset_s: middle_s, sigma_s: information.sqrt().recip(), gain });
+        offsets.push(ClockOffset { runs: None, offset_s: common_s, sigma_s: information.sqrt().recip(), gain });
     }
     if offsets.is_empty() {
-        return Clocks { remaining_s: middle_s, ..Clocks::default() };
+        return Clocks { remaining_s: common_s, ..Clocks::default() };
     }
     let mut records = datasets.to_vec();
     if is_common {
         let runs = records.iter_mut().flat_map(|dataset| &mut dataset.runs);
-        runs.flat_map(|run| &mut run.truth).for_each(|sample| sample.t_s -= middle_s);
+        runs.flat_map(|run| &mut run.truth).for_each(|sample| sample.t_s -= common_s);
     }
     for of in odd.iter().rev() {
         records[of.run.0].runs.remove(of.run.1);
     }
-    Clocks { offsets, records: Some(records), remaining_s: if is_common { 0.0 } else { middle_s } }
+    Clocks { offsets, records: Some(records), remaining_s: if is_common { 0.0 } else { common_s } }
+}
+
+/// The mean of the runs' own offsets, by their precision, without those that are off: of all runs' offsets,
+/// the one that most others lie near says which.
+fn common_offset_s(all: &[OfRun]) -> Option<f64> {
+    let apart = |of: &OfRun, offset_s: f64| (of.profile.offset_s - offset_s) / of.profile.tolerance_s();
+    let cost = |offset_s: f64| -> f64 { all.iter().map(|of| apart(of, offset_s).powi(2).min(1.0)).sum() };
+    let own = all.iter().map(|of| of.profile.offset_s);
+    let near_s = own.min_by(|a, b| cost(*a).total_cmp(&cost(*b)))?;
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for Profile { offset_s, sigma_s, .. } in all.iter().filter(|of| apart(of, near_s).abs() < 1.0).map(|of| &of.profile)
+    {
+        sum += offset_s * sigma_s.powi(-2);
+        weights += sigma_s.powi(-2);
+    }
+    Some(sum / weights)
 }
 
 /// Time, place and heading of a measured pose.
@@ -116,7 +127,7 @@ impl Profile {
     fn of(run: &RunView<'_>, dataset: &Dataset, geometry: &DriveGeometry) -> Option<Self> {
         let track = WheelAngleInterpolator::of(run, &dataset.robot)?;
         let (rows_s, truth) = (&run.odometry().t_s, &run.run().truth);
-        let (first_s, last_s) = (*rows_s.first()?, *rows_s.last()?);
+        let [first_s, last_s] = known_between(rows_s, track.turns())?;
         let within = |t_s: f64| t_s - MAX_CLOCK_OFFSET_S >= first_s && t_s + MAX_CLOCK_OFFSET_S <= last_s;
         let poses: Vec<Pose4> = truth
             .iter()
@@ -181,6 +192,11 @@ impl Profile {
         Some(Self { costs, offset_s: CLOCK_STEP_S * at, sigma_s: CLOCK_STEP_S / curvature.sqrt() })
     }
 
+    /// How far off other clocks it is no other clock, seconds.
+    const fn tolerance_s(&self) -> f64 {
+        MIN_CLOCK_OFFSET_S.max(MIN_CLOCK_SIGMAS * self.sigma_s)
+    }
+
     /// Log likelihood of its offset over that of another.
     fn gain_over(&self, offset_s: f64) -> f64 {
         let lowest = self.costs.iter().copied().fold(f64::INFINITY, f64::min);
@@ -190,6 +206,23 @@ impl Profile {
         let above = (below + 1).min(self.costs.len() - 1);
         self.costs[below] + share * (self.costs[above] - self.costs[below]) - lowest
     }
+}
+
+/// The instants between which the turns of the wheels are known: of the log; without an end where the robot
+/// sets off or comes to rest there, as it stood before and stands behind.
+fn known_between(rows_s: &[f64], turns: &Wheels<Vec<f64>>) -> Option<[f64; 2]> {
+    let (first_s, last_s) = (*rows_s.first()?, *rows_s.last()?);
+    let rate = |row: usize| {
+        let by_wheel = turns.as_ref().map(|turns| (turns[row + 1] - turns[row]).abs());
+        by_wheel.left.max(by_wheel.right) / (rows_s[row + 1] - rows_s[row])
+    };
+    let intervals = rows_s.len().checked_sub(1).filter(|intervals| *intervals > 0)?;
+    let fastest = (0..intervals).map(rate).fold(0.0, f64::max);
+    let stands = |row: usize| rate(row) <= MAX_RATE_AT_REST * fastest;
+    Some([
+        if stands(0) { f64::NEG_INFINITY } else { first_s },
+        if stands(intervals - 1) { f64::INFINITY } else { last_s },
+    ])
 }
 
 /// Turns of the wheels at an instant of the log, between rows in proportion.
@@ -265,6 +298,42 @@ pub(crate) mod tests {
         // Poses are taken at hundredths of a second.
         assert!((offset.offset_s - 0.3).abs() < 0.01, "{}", offset.offset_s);
         assert_eq!(found.records.expect("one is off")[0].runs.len(), 4);
+    }
+
+    #[test]
+    fn a_robot_that_sets_off_and_stops_in_the_log_stood_before_and_stands_behind() {
+        let rows_s = [0.0, 1.0, 2.0, 3.0];
+        let known = |left: [f64; 4], right: [f64; 4]| {
+            known_between(&rows_s, &Wheels { left: left.to_vec(), right: right.to_vec() })
+        };
+        let (before, behind) = (f64::NEG_INFINITY, f64::INFINITY);
+        assert_eq!(known([0.0, 0.1, 2.1, 2.1], [0.0, 0.0, 2.0, 2.0]), Some([before, behind]));
+        // Rejects a mean of both wheels: one of them turns at the end.
+        assert_eq!(known([0.0, 0.1, 2.1, 1.1], [0.0, 0.0, 2.0, 3.0]), Some([before, 3.0]));
+        assert_eq!(known([0.0, 1.0, 2.0, 3.0], [0.0; 4]), Some([0.0, 3.0]));
+        assert_eq!(known_between(&[1.0], &Wheels::both(vec![0.0])), None);
+    }
+
+    #[test]
+    fn a_short_run_between_two_rests_says_its_offset() {
+        // A quarter of a second less than two seconds of driving, with half a second at rest on either side:
+        // rejects a margin of the largest offset at both ends, which leaves no pose.
+        let mut log = driven(&[0.0; 4]);
+        let turned = |t_s: f64| 3.0 * (t_s - 0.5).clamp(0.0, 1.75) - (4.0 * (t_s - 0.5).clamp(0.0, 1.75)).sin() * 0.75;
+        let turn_rate = log.robot.left_wheel_diameter_m / log.robot.wheel_separation_m;
+        let run = &mut log.runs[2];
+        run.odometry.t_s = (0..=137).map(|row| 0.02 * f64::from(row)).collect();
+        let angles = |sign: f64| run.odometry.t_s.iter().map(|t_s| sign * turned(*t_s)).collect();
+        run.odometry.wheels = WheelLog::Angles(Wheels { left: angles(-1.0), right: angles(1.0) });
+        let pose = |k: u32| {
+            let t_s = 0.05 * f64::from(k);
+            TruthSample::new(t_s, 0.0, 0.0, Some(wrap_to_pi(turn_rate * turned(t_s - 0.3))))
+        };
+        run.truth = (0..55).map(pose).collect();
+        let found = offsets(&[log]);
+        let [offset] = &found.offsets[..] else { panic!("one run: {:?}", found.offsets) };
+        assert_eq!(offset.runs.as_deref(), Some(&["run-2".to_owned()][..]));
+        assert!((offset.offset_s - 0.3).abs() < 0.01, "{}", offset.offset_s);
     }
 
     #[test]

@@ -56,6 +56,11 @@ pub(crate) const MIN_CLOCK_RUNS: usize = 4;
 /// Convention: one in ten.
 pub(crate) const MIN_RUNS_PER_ODD_CLOCK: usize = 10;
 
+/// Ratio to the fastest wheel of the run. A robot whose wheels are slower in the first row sets off there,
+/// and one whose are in the last row comes to rest.
+/// Budgeted: a row of 50 ms of a robot that takes half a second to its speed has a twentieth on average.
+pub(crate) const MAX_RATE_AT_REST: f64 = 0.1;
+
 /// Number. Fewer pairs of poses do not say an offset.
 /// Budgeted: three seconds at ten a second.
 pub(crate) const MIN_CLOCK_PAIRS: usize = 30;
