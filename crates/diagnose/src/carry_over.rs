@@ -316,8 +316,13 @@ impl System {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
+
+    /// A verdict without the sizes behind it.
+    pub(crate) fn of_verdict(carries_over: Option<bool>) -> CarryOver {
+        CarryOver { carries_over, why: String::new(), by_level: Vec::new() }
+    }
 
     fn unit(name: &str, own: (f64, f64), contrast: (f64, f64)) -> UnitShare {
         let contrast = Contrast { value: contrast, sigmas_of_others: 10.0, power_sigmas: 0.5 / contrast.1 };

@@ -14,6 +14,8 @@ use crate::augmented_model::{AugmentedModel, refit};
 use crate::candidate::Candidate;
 use crate::record_faults::sessions;
 
+mod models;
+
 #[path = "../../../estimation/src/tests/golden_numbers.rs"]
 mod golden_numbers;
 
