@@ -457,4 +457,28 @@ mod tests {
         assert!(matches!(all[..], [Finding { basis: Basis::Uncorrelated(_), .. }]), "{all:?}");
         assert!(noise_effects(&of, Vec::new()).is_empty());
     }
+
+    #[test]
+    fn another_robots_geometry_is_said_once_and_doubts_what_was_found_beside_it() {
+        let datasets = [session(0, 0.0)];
+        let of = |[wheels, separation]: [f64; 2]| {
+            let mut structure = structure(&datasets, &[]);
+            for fit in [&mut structure.base, &mut structure.found.model.fit] {
+                let model = &mut fit.solution.model;
+                model.m_per_rad = model.m_per_rad.map(|m| wheels * m);
+                model.separation_m *= separation;
+            }
+            let all = faults_of_the_log(&results(&datasets, &structure), vec![mean("slip_speed", 9.0)]);
+            let doubts = all[0].doubts.clone();
+            (doubts, all[1..].iter().map(|finding| finding.first().id()).collect::<Vec<_>>())
+        };
+        assert_eq!(of([1.0, 1.0]), (vec![], vec![]));
+        // Wheels of another robot are no larger wheels too; a separation is a finding of its own.
+        let other = vec![Doubt::OtherGeometry];
+        assert_eq!(of([2.0, 1.0]), (other.clone(), vec!["wrong_counts_per_turn"]));
+        assert_eq!(of([2.0, 1.4]), (other.clone(), vec!["wrong_counts_per_turn", "wheelbase"]));
+        assert_eq!(of([1.2, 1.0]), (other.clone(), vec!["wheel_scale"]));
+        // A robot that skids in turns is the one that is described.
+        assert_eq!((of([1.0, 1.4]), of([1.0, 0.7])), ((vec![], vec!["wheelbase"]), (other, vec!["wheelbase"])));
+    }
 }
