@@ -131,3 +131,18 @@ pub(crate) fn alternatives(
     all.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds).then(a.id.cmp(&b.id)));
     all
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_detectable_or_not_resolved_is_not_tested() {
+        assert!(!Status::NotDetectable.is_tested() && !Status::NotResolved.is_tested());
+        assert!(Status::Found.is_tested() && Status::NotSignificant.is_tested() && Status::ExplainsLess.is_tested());
+        assert!(Status::Refused(Refusal::Cancels).is_tested() && Status::NotDiscriminated.is_tested());
+        assert_eq!(Status::NotResolved.text(), NOT_RESOLVED);
+        let words = [Refusal::OtherWheels, Refusal::Cancels, Refusal::DriftsMore].map(|of| Status::Refused(of).text());
+        assert!(words.iter().all(|of| of.starts_with("significant")) && words[0] != words[1] && words[1] != words[2]);
+    }
+}

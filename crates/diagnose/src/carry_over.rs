@@ -316,8 +316,13 @@ impl System {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
+
+    /// A verdict without the sizes behind it.
+    pub(crate) fn of_verdict(carries_over: Option<bool>) -> CarryOver {
+        CarryOver { carries_over, why: String::new(), by_level: Vec::new() }
+    }
 
     fn unit(name: &str, own: (f64, f64), contrast: (f64, f64)) -> UnitShare {
         let contrast = Contrast { value: contrast, sigmas_of_others: 10.0, power_sigmas: 0.5 / contrast.1 };
@@ -366,5 +371,126 @@ mod tests {
         // The ridge changes them by 1e-11.
         assert!((shares[0] - 1.5).abs() < 1e-9 && (shares[1] - 0.5).abs() < 1e-9, "{shares}");
         assert!((covariance[(0, 0)] - 0.25).abs() < 1e-9 && covariance[(0, 1)].abs() < 1e-9, "{covariance}");
+    }
+
+    #[test]
+    fn why_a_term_stays_open_is_said() {
+        let weak = |name: &str, share: f64| UnitShare { contrast: None, ..unit(name, (share, 0.1), (0.5, 0.1)) };
+        let why = |units: Vec<UnitShare>| verdict(&[sessions(units)]).1;
+        // Three standard deviations and no more are not plain.
+        assert_eq!(why(vec![weak("a", 1.0), weak("b", 0.3)]), "only session a shows it");
+        assert_eq!(why(vec![weak("a", -1.0), weak("b", 0.2)]), "only session a shows it");
+        assert_eq!(why(vec![weak("a", 1.0), weak("b", 1.0)]), "0 of 2 testable by session");
+        let agrees = || unit("c", (1.0, 0.1), (0.5, 0.1));
+        assert_eq!(why(vec![agrees(), weak("b", 1.0)]), "1 of 2 testable by session");
+        let near = || unit("b", (0.6, 0.1), (0.1, 0.1));
+        assert_eq!(why(vec![agrees(), near()]), "too weak in session b");
+        let both = verdict(&[sessions(vec![agrees(), agrees()]), sessions(vec![agrees(), near()])]);
+        assert_eq!(both, (None, "2 of 2 by session; too weak in session b".to_owned()));
+        let (all, why) = verdict(&[sessions(vec![agrees(), agrees(), weak("b", 1.0)])]);
+        assert!(all == Some(true) && why.ends_with("of the size: 2 of 3 by session"), "{why}");
+        // A unit that is 1.7 below nothing is none of three by chance: 0.045 · 3. Rejects each for itself, and
+        // one that is as far above.
+        let below = |z: f64| unit("b", (0.4, 0.1), (-0.1 * z, 0.1));
+        assert_eq!(verdict(&[sessions(vec![agrees(), below(1.7), agrees()])]).0, None);
+        assert_eq!(verdict(&[sessions(vec![agrees(), below(2.2), agrees()])]).0, Some(false));
+        assert_eq!(verdict(&[sessions(vec![agrees(), below(-2.2), agrees()])]).0, Some(true));
+    }
+
+    #[test]
+    fn a_unit_is_asked_where_the_others_know_the_size_and_it_would_show() {
+        let is_testable = |sigmas_of_others, power_sigmas| {
+            Contrast { value: (0.5, 0.1), sigmas_of_others, power_sigmas }.is_testable()
+        };
+        assert!(is_testable(3.0, 2.93) && !is_testable(2.99, 10.0) && !is_testable(10.0, 2.92));
+    }
+
+    #[test]
+    fn sizes_are_shares_of_what_was_found() {
+        let by_level = vec![
+            sessions(vec![
+                unit("a", (0.5, 0.1), (0.1, 0.1)),
+                UnitShare { own: None, ..unit("b", (1.0, 0.1), (0.5, 0.1)) },
+            ]),
+            SizesByUnit { level: Level::Kind, ..sessions(vec![unit("spin", (2.0, 0.1), (0.1, 0.1))]) },
+        ];
+        let of = CarryOver { carries_over: None, why: String::new(), by_level };
+        let sizes = of.sizes(Level::Session, &[("slip_s_m", "s/m", -0.04)]);
+        // A standard deviation has no sign.
+        let value = Value { value: -0.02, sigma: Some(0.004), unit: "s/m".to_owned() };
+        assert_eq!(sizes, BTreeMap::from([("a".to_owned(), BTreeMap::from([("slip_s_m".to_owned(), value)]))]));
+        assert!(of.sizes(Level::Kind, &[("slip_s_m", "s/m", -0.04)]).contains_key("spin"));
+        assert_eq!(of.heterogeneity().count(), 0);
+    }
+
+    fn system(shared: usize, runs: &[(&[f64], &[f64])]) -> System {
+        let run = |(number, (matrix, gradient)): (usize, &(&[f64], &[f64]))| {
+            let n = shared + 1;
+            let (matrix, gradient) = (DMatrix::from_row_slice(n, n, matrix), DVector::from_column_slice(gradient));
+            ((0, number), Information { matrix, gradient })
+        };
+        System { runs: runs.iter().enumerate().map(run).collect(), shared }
+    }
+
+    #[test]
+    fn shares_are_fitted_together_with_what_units_have_in_common() {
+        // The sum over the shared column and those of two units is [[2, 1, −1], [1, 2, 0], [−1, 0, 2]] with the
+        // gradient (0, −1, 1): steps −1, 1, −1, and a covariance of the units of [[3, −1], [−1, 3]]/4. Rejects
+        // the units by themselves, ½ and a variance of ½.
+        let (a, b) = ([1.0, 1.0, 1.0, 2.0], [1.0, -1.0, -1.0, 2.0]);
+        let system = system(1, &[(&a, &[0.0, -1.0]), (&b, &[0.0, 1.0]), (&b, &[9.0, 9.0])]);
+        let unit = |(_, run): (usize, usize)| [Some(0), Some(1), None][run];
+        let (shares, covariance) = system.shares(2, unit).expect("determined");
+        assert!((shares[0] - 2.0).abs() < 1e-9 && shares[1].abs() < 1e-9, "{shares}");
+        let expected = [0.75, -0.25, 0.75];
+        let found = [covariance[(0, 0)], covariance[(0, 1)], covariance[(1, 1)]];
+        assert!(found.iter().zip(expected).all(|(found, of)| (found - of).abs() < 1e-9), "{covariance}");
+    }
+
+    #[test]
+    fn runs_that_scatter_beyond_the_noise_widen_the_shares_where_there_are_enough_of_them() {
+        // Of each of two units four runs with information 1 and scores of 3, either way: without the run in the
+        // fit 4, so that the variance is 7/8 · 64/16. The noise alone makes ¼.
+        let scores = |score: f64| [[score], [-score]].concat().repeat(4);
+        let variance = |score: f64, runs: usize| {
+            let gradients: Vec<Vec<f64>> = scores(score).iter().map(|of| vec![*of]).collect();
+            let runs: Vec<(&[f64], &[f64])> = gradients[..runs].iter().map(|of| (&[1.0][..], &of[..])).collect();
+            system(0, &runs).shares(2, |(_, run)| Some(run / 4)).expect("determined").1[(0, 0)]
+        };
+        assert!((variance(3.0, 8) - 3.5).abs() < 1e-9, "{}", variance(3.0, 8));
+        // Runs that scatter less than the noise, and too few of them, leave it.
+        assert!((variance(0.1, 8) - 0.25).abs() < 1e-9 && (variance(3.0, 7) - 0.25).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_unit_has_its_runs_and_its_name() {
+        use crate::tests::{fitted, session};
+        let datasets = [session(0, 0.0), session(1, 0.0), session(2, 0.0)];
+        let model = AugmentedModel::base(&fitted(&datasets));
+        let names = ["a", "b", "a"].map(ToOwned::to_owned);
+        let sessions = Units::of(&model, &names, Level::Session);
+        // Sessions that are called alike are told by their numbers, and one without a name too.
+        assert_eq!(sessions.names, ["a (1)", "b", "a (3)"]);
+        assert_eq!(Units::of(&model, &names[..2], Level::Session).names, ["a", "b", "3"]);
+        let kinds = Units::of(&model, &names, Level::Kind);
+        assert_eq!(kinds.names, ["straight", "spin", "square"]);
+        assert_eq!((kinds.of_run.len(), kinds.of_run[&(1, 5)], kinds.of_run[&(2, 7)]), (24, 1, 2));
+        assert_eq!((sessions.of_run[&(0, 0)], sessions.of_run[&(2, 7)]), (0, 2));
+    }
+
+    #[test]
+    fn regress_no_number_of_a_carry_over_moves() {
+        use crate::tests::{assert_unmoved, fitted, session, with_effects};
+        // The third session has a third of what the others have.
+        let datasets = [session(0, 0.1), session(1, 0.1), session(2, 0.03)];
+        let names = ["a", "b", "c"].map(ToOwned::to_owned);
+        let model = with_effects(&fitted(&datasets), &["slip_speed", "truth_latency"]);
+        let text = [0, 1].map(|candidate| format!("{:#?}\n", carry_over(&model, candidate, &names)));
+        assert_unmoved("carry_over.txt", &text.concat());
+        // One session of one kind has nothing to carry over to.
+        let mut one = [session(0, 0.1)];
+        one[0].runs.retain(|run| run.info.protocol == Some(dataset::Protocol::SquareCw));
+        let model = with_effects(&fitted(&one), &["slip_speed"]);
+        assert_eq!(carry_over(&model, 0, &names).by_level, []);
     }
 }

@@ -398,3 +398,38 @@ pub struct Predicted {
     /// The mean over the runs of that direction, by name.
     pub values: BTreeMap<String, Value>,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_model_drifts_more_beyond_the_interval_and_by_a_material_share_alone() {
+        let drifts = |base, extended, low, high, half_widths| {
+            let of = Compared { base, extended, low, high };
+            let gain =
+                Gain { held_out_runs: 6, log_score_per_observation: of, drift_percent: Some(of), levels: vec![] };
+            gain.drifts_more_by(half_widths)
+        };
+        // −3 ± 2: below nothing by one half-width, and not by two.
+        assert!(drifts(1.0, 4.0, -5.0, -1.0, 1.0) && !drifts(1.0, 4.0, -5.0, -1.0, 2.0));
+        assert!(drifts(1.0, 4.0, -5.0, -1.0, -1.0));
+        // +3 ± 2 drifts less. Rejects the difference of the bounds for their mean.
+        assert!(!drifts(4.0, 1.0, 1.0, 5.0, 1.0));
+        // An interval from below nothing to above it, and one that ends at nothing, say nothing.
+        assert!(!drifts(1.0, 1.5, -2.0, 1.0, 1.0) && !drifts(1.0, 2.0, -2.0, 0.0, 1.0));
+        // By 4 % more, and by 6 %. Rejects any increase.
+        assert!(!drifts(1.0, 1.04, -0.05, -0.03, 1.0) && drifts(1.0, 1.06, -0.07, -0.05, 1.0));
+        let of = Compared { base: 1.0, extended: 4.0, low: -5.0, high: -1.0 };
+        let gain = Gain { held_out_runs: 6, log_score_per_observation: of, drift_percent: Some(of), levels: vec![] };
+        assert!(gain.drifts_more() && !Gain { drift_percent: None, ..gain }.drifts_more());
+    }
+
+    #[test]
+    fn a_term_without_a_number_is_not_determined() {
+        let term = |size| UnlistedTerm::determined("yaw", vec!["v".to_owned()], size);
+        let of = term((0.2, 0.1)).expect("determined");
+        assert_eq!((of.channel.as_str(), of.coefficient, of.sigma), ("yaw", 0.2, 0.1));
+        assert!(term((f64::NAN, 0.1)).is_none() && term((0.2, f64::INFINITY)).is_none());
+    }
+}

@@ -243,3 +243,82 @@ fn is_of_sizes(form: &RecordCorrection, sizes: &[(String, f64)]) -> bool {
         *name == "probability" || own.is_some_and(|(_, own)| (own - value).abs() <= FACTOR_TOLERANCE * own.abs())
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SCENARIO: &str = include_str!("../../../scenarios/motion-capture.toml");
+
+    fn scenario(effects: &str) -> Scenario {
+        let (head, _) = SCENARIO.split_once("[[effect]]").expect("effects");
+        let (_, protocols) = SCENARIO.split_once("[[protocol]]").expect("protocols");
+        Scenario::parse(&format!("{head}{effects}\n[[protocol]]{protocols}"), "a.toml").expect("a scenario")
+    }
+
+    fn model(effects: &str) -> Result<ExtendedModel, ExtendedModelError> {
+        ExtendedModel::of(&scenario(effects))
+    }
+
+    #[test]
+    fn a_model_has_the_geometry_and_the_mean_terms_of_its_effects() {
+        let of = ExtendedModel::of(&Scenario::parse(SCENARIO, "a.toml").expect("shipped")).expect("a model");
+        let effects: Vec<(&str, Range<usize>)> = of.effects.iter().map(|of| (of.id, of.terms.clone())).collect();
+        // An eccentricity of two wheels is two terms, of which the left one's sizes are none.
+        assert_eq!(
+            effects[..4],
+            [("wheel_scale", 0..0), ("wheel_mismatch", 0..0), ("wheelbase", 0..0), effects[3].clone()]
+        );
+        assert_eq!(of.effects.iter().map(|of| of.terms.len()).sum::<usize>(), of.calibration.terms.len());
+        let slip = of.effects.iter().find(|of| of.id == "slip_speed").expect("it slips");
+        assert_eq!(slip.values, [("slip_s_m".to_owned(), 0.004)]);
+        assert_eq!(of.effects[0].values, [("scale".to_owned(), 1.01)]);
+        assert!(of.calibration.term_values.contains(&0.004), "{:?}", of.calibration.term_values);
+        let values = &of.calibration.calibration.values;
+        // 0.363 · 1.015, and diameters whose mean is 0.16 · 1.01 with a ratio of 0.998.
+        assert!((values["wheel_separation_m"] - 0.368_445).abs() < 1e-9, "{values:?}");
+        let [left, right] = ["left_wheel_diameter_m", "right_wheel_diameter_m"].map(|key| values[key]);
+        assert!((right / left - 0.998).abs() < 1e-9 && (left + right - 0.3232).abs() < 1e-3, "{values:?}");
+        assert!(!of.changes_records() && of.remarks.is_empty());
+        let robot = crate::tests::session(0, 0.0).robot;
+        assert!(of.check(&robot).is_ok());
+        let other = NominalRobot { wheel_separation_m: 9.0, ..robot };
+        assert!(matches!(of.check(&other), Err(ExtendedModelError::OtherRobot(_))));
+    }
+
+    #[test]
+    fn what_has_no_mean_is_remarked_and_what_is_of_the_records_is_undone() {
+        let of = model(
+            "[[effect]]\nkind = \"swapped_wheels\"\nswapped = true\n\n[[effect]]\nkind = \"truth_outliers\"\nprobability = 0.01\njump_m = 0.1\njump_rad = 0.1\n",
+        );
+        let of = of.expect("a model");
+        assert!(of.changes_records() && of.calibration.terms.is_empty());
+        assert_eq!(of.remarks.len(), 1);
+        let sound = crate::tests::session(0, 0.0);
+        let (records, remarks) = of.undone(&sound).expect("any log may be swapped");
+        let [before, after] = [&sound, &records].map(|dataset| match &dataset.runs[1].odometry.wheels {
+            dataset::WheelLog::Angles(angles) => angles.left.clone(),
+            other => panic!("angles, not {other:?}"),
+        });
+        assert!(before != after && remarks[0].starts_with("swapped_wheels is undone: "), "{remarks:?}");
+        // A trace that the log does not have is remarked, and the log stays.
+        let torn = model("[[effect]]\nkind = \"torn_read\"\nprobability = 0.01\njump_counts = 256\n").expect("a model");
+        let (records, remarks) = torn.undone(&sound).expect("no trace");
+        assert_eq!((records, &remarks[..]), (sound, &["torn_read: this log shows no trace of it".to_owned()][..]));
+    }
+
+    #[test]
+    fn a_fault_is_undone_by_the_form_of_its_sizes() {
+        let form = |values: &[(&'static str, f64)]| RecordCorrection {
+            values: values.to_vec(),
+            sentence: String::new(),
+            visible_in_log: false,
+            mistakes: 1,
+            records: crate::tests::session(0, 0.0),
+        };
+        let sizes = [("factor".to_owned(), 2.0), ("side".to_owned(), -1.0)];
+        assert!(is_of_sizes(&form(&[("factor", 2.09)]), &sizes) && !is_of_sizes(&form(&[("factor", 2.11)]), &sizes));
+        assert!(is_of_sizes(&form(&[("side", -1.04)]), &sizes) && !is_of_sizes(&form(&[("side", -0.9)]), &sizes));
+        assert!(is_of_sizes(&form(&[("probability", 0.3)]), &sizes) && !is_of_sizes(&form(&[("other", 2.0)]), &sizes));
+    }
+}

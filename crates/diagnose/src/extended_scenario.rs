@@ -243,3 +243,75 @@ fn protocols(datasets: &[Dataset]) -> Vec<Schedule> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn info(protocol: Option<Protocol>, size: f64) -> dataset::Run {
+        let settings = dataset::ProtocolSettings {
+            side_m: Some(size),
+            radius_m: Some(size),
+            length_m: Some(size),
+            turn_rad: Some(size),
+        };
+        let info = dataset::RunInfo { protocol, settings, ..dataset::RunInfo::default() };
+        dataset::Run { info, ..dataset::Run::default() }
+    }
+
+    #[test]
+    fn what_was_driven_is_driven_again_as_often() {
+        let of = |runs: &[(Option<Protocol>, f64)]| {
+            let mut dataset = crate::tests::session(0, 0.0);
+            dataset.runs = runs.iter().map(|(protocol, size)| info(*protocol, *size)).collect();
+            protocols(&[dataset])
+        };
+        // Forward and backward are one kind, and so are both ways of a square; three of them are two pairs.
+        let (straight, spin) = (Some(Protocol::Straight), Some(Protocol::Spin));
+        let (cw, ccw) = (Some(Protocol::SquareCw), Some(Protocol::SquareCcw));
+        let driven = of(&[
+            (straight, 1.0),
+            (straight, -1.0),
+            (straight, 2.0),
+            (spin, -3.0),
+            (cw, 1.0),
+            (ccw, 1.0),
+            (cw, 1.0),
+            (Some(Protocol::CircleCcw), 0.5),
+            (Some(Protocol::Path), 9.0),
+        ]);
+        let expected = [
+            Schedule::Straights { length_m: 1.0, runs: 2 },
+            Schedule::Straights { length_m: 2.0, runs: 1 },
+            Schedule::Spins { turn_rad: 3.0, runs: 1 },
+            Schedule::Squares { side_m: 1.0, runs_each_way: 2 },
+            Schedule::Circles { radius_m: 0.5, turns: None, runs_each_way: 1 },
+        ];
+        assert_eq!(driven, expected);
+        // What has no words is driven as straights, spins and squares.
+        assert_eq!(of(&[(None, 1.0)]).len(), 3);
+    }
+
+    #[test]
+    fn a_quantile_is_the_value_below_which_its_share_lies() {
+        let of = |share| quantile(&mut [3.0, 1.0, 4.0, 2.0], share);
+        assert_eq!((of(0.0), of(0.5), of(0.75), of(1.0)), (Some(1.0), Some(3.0), Some(4.0), None));
+        assert_eq!(quantile(&mut [], 0.5), None);
+    }
+
+    #[test]
+    fn the_robot_as_found_has_the_calibrated_ratios() {
+        use crate::tests::{fitted, session};
+        let datasets = [session(0, 0.0)];
+        let mut model = AugmentedModel::base(&fitted(&datasets));
+        model.fit.solution.model.m_per_rad = kinematics::Wheels { left: 0.09, right: 0.081 };
+        model.fit.solution.model.separation_m = 0.363 * 1.1;
+        let effects = geometry(&model).expect("a drive");
+        let [Effect::WheelScale(scale), Effect::WheelMismatch(mismatch), Effect::Wheelbase(base)] = &effects else {
+            panic!("three ratios")
+        };
+        // (0.09 + 0.081)/0.16, 0.081/0.09 and 1.1.
+        assert!((scale.scale - 1.068_75).abs() < 1e-12 && (mismatch.right_over_left - 0.9).abs() < 1e-12);
+        assert!((base.ratio - 1.1).abs() < 1e-12);
+    }
+}

@@ -275,3 +275,6 @@ fn by_significance(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -
     findings[results.faults.len()..].sort_by(|a, b| b.z.total_cmp(&a.z));
     findings
 }
+
+#[cfg(test)]
+mod tests;

@@ -312,4 +312,65 @@ mod tests {
         // the gains.
         assert_eq!(ratio(&[(1.0, 1.0), (3.0, 3.0), (6.0, 6.0)]), (1.0, 0.0));
     }
+
+    fn end(run: usize, position_m: f64, length_m: f64) -> EndError {
+        EndError { run: (0, run), position_m, heading_rad: 0.0, length_m, off: kinematics::Pose::IDENTITY }
+    }
+
+    #[test]
+    fn drift_is_the_final_error_over_the_distance_by_what_was_held_out_together() {
+        let before = [end(0, 0.03, 1.0), end(1, 0.05, 1.0), end(2, 0.04, 2.0)];
+        let after = [end(0, 0.01, 1.0), end(1, 0.01, 1.0), end(2, 0.02, 2.0)];
+        let of = drift(&before, &after, HeldOut::Runs).expect("three runs");
+        // 0.12 and 0.04 m of four metres, in per cent; gains of 2, 4 and 2 on 1, 1 and 2 m.
+        assert!((of.base - 3.0).abs() < 1e-9 && (of.extended - 1.0).abs() < 1e-9, "{of:?}");
+        // The residuals of 2 % are 0, 2 and −2: √(8 · 3/2)/4, with Student's quantile of two degrees.
+        let half_width = 12_f64.sqrt() / 4.0 * student_95(2.0);
+        assert!((of.low - (2.0 - half_width)).abs() < 1e-9 && (of.high - (2.0 + half_width)).abs() < 1e-9, "{of:?}");
+        // Two of the runs are one unit: gains of 6 on 2 m and of 2 on 2 m.
+        let of_run = BTreeMap::from([((0, 0), 0), ((0, 1), 0), ((0, 2), 1)]);
+        let units = Units { names: vec!["a".to_owned(), "b".to_owned()], of_run };
+        let of = drift(&before, &after, HeldOut::Units(&units)).expect("two units");
+        assert!((of.low + of.high - 4.0).abs() < 1e-9 && (of.high - 2.0 - student_95(1.0)).abs() < 1e-6, "{of:?}");
+        // One unit has no scatter, other runs are no pair, and no distance is no drift.
+        assert!(drift(&before[..1], &after[..1], HeldOut::Runs).is_none());
+        assert!(drift(&before, &after[..2], HeldOut::Runs).is_none());
+        let standing = [end(0, 0.03, 0.0), end(1, 0.05, 0.0)];
+        assert!(drift(&standing, &standing, HeldOut::Runs).is_none());
+    }
+
+    #[test]
+    fn runs_of_each_protocol_are_in_every_fold_and_blocks_in_turn() {
+        use crate::tests::{fitted, session};
+        let datasets = [session(0, 0.0)];
+        let fit = fitted(&datasets);
+        let units = &fit.solution.pass.runs;
+        // Two straights, two spins and four squares, in the order straight, spin, square, square: of six folds.
+        assert_eq!(folds(&fit, units, false), [0, 2, 4, 0, 1, 3, 5, 1]);
+        assert_eq!(folds(&fit, units, true), [0, 1, 2, 3, 4, 5, 0, 1]);
+    }
+
+    #[test]
+    fn priors_are_of_terms_and_where_kinds_are_held_out_of_lengths() {
+        use crate::tests::{effect, fitted, session, with_effects};
+        let datasets = [session(0, 0.1)];
+        let model = with_effects(&fitted(&datasets), &["slip_speed"]);
+        let terms = terms(&model.candidates);
+        let sigma = effect("slip_speed").parameters()[0].prior_sigma;
+        let size = model.estimates(0)[0];
+        let (runs, kinds) = (prior(&model.fit, &terms, false), prior(&model.fit, &terms, true));
+        for (k, column) in model.fit.columns.iter().enumerate() {
+            let (found, nominal) = (&model.fit.solution.model, &model.fit.nominal);
+            let expected = match column {
+                Column::Term(_) => (size, sigma.powi(-2), sigma.powi(-2)),
+                // A twentieth and three tenths.
+                Column::LeftWheel => ((found.m_per_rad.left / nominal.m_per_rad.left).ln(), 0.0, 400.0),
+                Column::RightWheel => ((found.m_per_rad.right / nominal.m_per_rad.right).ln(), 0.0, 400.0),
+                Column::Separation => ((found.separation_m / nominal.separation_m).ln(), 0.0, 1.0 / 0.09),
+                _ => (0.0, 0.0, 0.0),
+            };
+            assert!((runs[k].0 - expected.0).abs() < 1e-12 && (kinds[k].0 - expected.0).abs() < 1e-12, "{column:?}");
+            assert!((runs[k].1 - expected.1).abs() < 1e-6 && (kinds[k].1 - expected.2).abs() < 1e-6, "{column:?}");
+        }
+    }
 }

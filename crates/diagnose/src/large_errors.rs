@@ -98,3 +98,46 @@ pub(crate) fn mean_speed_m_s(large: &[LargeError]) -> f64 {
     let time_s: f64 = large.iter().map(|large| large.at_s - large.from_s).sum();
     if time_s > 0.0 && distance_m > 0.0 { distance_m / time_s } else { 1.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::candidate::terms;
+    use crate::outlier_attribution::tests::driven;
+    use crate::tests::{assert_unmoved, fitted};
+
+    fn large(travel_m: [f64; 2], [from_s, at_s]: [f64; 2]) -> LargeError {
+        LargeError {
+            run: (0, 0),
+            run_id: String::new(),
+            from_s,
+            at_s,
+            travel_m: Wheels { left: travel_m[0], right: travel_m[1] },
+            is_displacement: false,
+            relative_distance: 1.0,
+            ramp_odds: 1.0,
+            z: 4.0,
+        }
+    }
+
+    #[test]
+    fn speed_where_the_robot_erred_is_that_of_both_wheels_whichever_way() {
+        // (0.2 + 0.4)/2 and (0.1 + 0.3)/2 metres in two seconds and half of one.
+        let all = [large([0.2, -0.4], [1.0, 3.0]), large([-0.1, 0.3], [5.0, 5.5])];
+        assert!((mean_speed_m_s(&all) - 0.5 / 2.5).abs() < 1e-12, "{}", mean_speed_m_s(&all));
+        assert_eq!((mean_speed_m_s(&[]), mean_speed_m_s(&[large([0.0, 0.0], [1.0, 3.0])])), (1.0, 1.0));
+        assert_eq!(mean_speed_m_s(&[large([0.1, 0.1], [1.0, 1.0])]), 1.0);
+    }
+
+    #[test]
+    fn regress_no_number_of_a_large_error_moves() {
+        let mut text = String::new();
+        for (cause, are_displacements) in [("bumps", false), ("truth_outliers", true), ("stick_slip", false)] {
+            let datasets = [driven(cause, are_displacements)];
+            let fit = fitted(&datasets).evaluated_ungated();
+            let found = large_errors(&fit, &fit.scan(&mut terms(&[])).innovations);
+            text += &format!("{cause}: {} {:#?}\n", mean_speed_m_s(&found), &found[..found.len().min(4)]);
+        }
+        assert_unmoved("large_errors.txt", &text);
+    }
+}

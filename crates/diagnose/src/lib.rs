@@ -64,6 +64,9 @@ mod text;
 mod unknown_motion;
 mod wald;
 
+#[cfg(test)]
+mod tests;
+
 pub use alternatives::{Alternative, Status};
 pub use diagnosis::{DiagnoseError, Diagnosis, FittedModel, Options, diagnose, diagnose_large};
 pub use document::{

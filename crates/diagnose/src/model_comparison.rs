@@ -97,4 +97,22 @@ mod tests {
         assert!((sigma_of_sum(&[1.0, 2.0, 3.0]) - 3_f64.sqrt()).abs() < 1e-12);
         assert_eq!(sigma_of_sum(&[5.0]), 0.0);
     }
+
+    #[test]
+    fn margins_and_odds_are_of_three_or_of_a_hundredth() {
+        assert_eq!((log_odds_margin(100.0), log_odds_margin(-5.0)), (3.0, 3.0));
+        assert!((log_odds_margin(1000.0) - 10.0).abs() < 1e-12);
+        // A difference of one margin is one of three: e⁻³.
+        assert!((odds_within(-6.0, 6.0) - (-3.0_f64).exp()).abs() < 1e-12);
+        assert!((relative_odds(98.0, 100.0) - (-2.0_f64).exp()).abs() < 1e-12);
+        // Of 1000 the margin is 10: 20 below it are e⁻⁶.
+        assert!((relative_odds(980.0, 1000.0) - (-6.0_f64).exp()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn an_occam_factor_takes_what_directions_explain_from_their_sizes() {
+        // Information 4 and size 3 explain 36. Rejects the size alone, or its square alone.
+        assert_eq!(occam_factor(&[(4.0, 3.0)]), log_occam_factor(&[(4.0, 36.0)]));
+        assert!(occam_factor(&[(4.0, 3.0)]) < occam_factor(&[(4.0, 1.0)]));
+    }
 }

@@ -97,4 +97,35 @@ mod tests {
         let p = judged(3.0, &[-1.1, -1.0, -0.9]);
         assert!((p - p_of_upper_student(3.0 / (4.0_f64 / 3.0).sqrt(), 2.0)).abs() < 1e-12, "{p}");
     }
+
+    #[test]
+    fn a_correlation_is_judged_beyond_what_simulated_runs_have() {
+        // Means 0.2 and 4, standard deviation 2: 0.5 − 0.2 and (10 − 4)/2. Rejects quotients by the sum, by
+        // the count of values or by the variance.
+        let simulated = [(0.1, 2.0), (0.2, 4.0), (0.3, 6.0)];
+        let (coefficient, sigmas) = beyond_simulated((0.5, 10.0), &simulated);
+        assert!((coefficient - 0.3).abs() < 1e-12 && (sigmas - 3.0).abs() < 1e-12, "{coefficient} {sigmas}");
+        // What is no more than that is nothing, and what has the other sign stays.
+        assert_eq!(beyond_simulated((0.1, 3.0), &simulated), (0.0, 0.0));
+        assert_eq!(beyond_simulated((-0.5, -10.0), &simulated), (-0.5, -5.0));
+        // Rejects means that are taken off by their sign alone: both are negative here.
+        let (coefficient, sigmas) = beyond_simulated((-0.5, -10.0), &simulated.map(|(a, b)| (-a, -b)));
+        assert!((coefficient + 0.3).abs() < 1e-12 && (sigmas + 3.0).abs() < 1e-12, "{coefficient} {sigmas}");
+        // Standard errors are not below 1, by formula.
+        let (_, sigmas) = beyond_simulated((0.5, 10.0), &[(0.0, 3.9), (0.0, 4.0), (0.0, 4.1)]);
+        assert!((sigmas - 6.0).abs() < 1e-12, "{sigmas}");
+    }
+
+    #[test]
+    fn a_p_value_among_simulated_ones_is_made_no_stricter() {
+        use crate::statistics::p_of_z;
+        // Simulated ones that are all large leave it as it is, but for the tail of few.
+        let p_value = among_simulated(1e-3, [0.9, 0.8, 0.7].iter());
+        assert!(p_value > 1e-3 && p_value < 0.1, "{p_value}");
+        assert_eq!(among_simulated(0.9, [0.5, 0.5, 0.5].iter()), 0.9);
+        // z of 0, 2 and 4, and 6 itself, as above. Rejects z of both sides.
+        let of = |z: f64| if z == 0.0 { 0.5 } else { 0.5 * p_of_z(z) };
+        let p_value = among_simulated(of(6.0), [of(0.0), of(2.0), of(4.0)].iter());
+        assert!((p_value - 0.5 * (1.0 - (3.0_f64 / 5.0).sqrt())).abs() < 1e-6, "{p_value}");
+    }
 }

@@ -309,4 +309,173 @@ mod tests {
         assert_eq!(rivals(&tried, false, &best), [("wrong_counts_per_turn", -1.0), ("reversed_wheel", -2.0)]);
         assert_eq!(rivals(&tried, true, &best), []);
     }
+
+    use estimation::Noise;
+
+    use crate::tests::{fitted, session};
+
+    /// A fit without measurements: wheels and separation over nominal, the instrument's heading, and standard
+    /// deviations of the noise.
+    fn fit<'a>([left, right, separation]: [f64; 3], theta_rad: f64, sigmas: [f64; 4]) -> ModelFit<'a> {
+        let of = estimation::Model::of(&session(0, 0.0).robot.geometry().expect("a drive"), 0);
+        let noise = Noise { variance: sigmas.map(|sigma| sigma * sigma), timing_s2: 0.0 };
+        let mut fit = ModelFit::from_parameters(of, noise, &[]);
+        let model = &mut fit.solution.model;
+        model.m_per_rad.left *= left;
+        model.m_per_rad.right *= right;
+        model.separation_m *= separation;
+        model.body_from_sensor.theta_rad = theta_rad;
+        fit
+    }
+
+    const SOUND: [f64; 4] = [1e-3, 1e-3, 1e-3, 1e-3];
+
+    #[test]
+    fn geometry_is_the_stated_one_within_two_or_one_and_a_half_prior_deviations() {
+        // Wheels to e^±0.1, the separation to e^±0.45, each for itself and either way.
+        let is_stated = |ratios| has_stated_geometry(&fit(ratios, 0.0, SOUND));
+        assert!(is_stated([1.0; 3]) && is_stated([1.1, 1.1, 1.5]) && is_stated([0.91, 0.91, 0.65]));
+        for off in
+            [[1.12, 1.0, 1.0], [0.89, 1.0, 1.0], [1.0, 1.12, 1.0], [1.0, 0.89, 1.0], [1.0, 1.0, 1.6], [1.0, 1.0, 0.6]]
+        {
+            assert!(!is_stated(off), "{off:?}");
+        }
+    }
+
+    #[test]
+    fn a_drive_has_the_noise_of_one_and_its_fit_converged() {
+        let is = |sigmas| is_drive(&fit([1.0; 3], 0.0, sigmas));
+        assert!(is(SOUND) && is([9.9e-3, 0.049, 1.0, 1.0]));
+        assert!(!is([0.011, 1e-3, 1e-3, 1e-3]) && !is([1e-3, 0.051, 1e-3, 1e-3]));
+        assert!(!is_drive(&fit([1.2, 1.0, 1.0], 0.0, SOUND)));
+        let mut diverged = fit([1.0; 3], 0.0, SOUND);
+        diverged.solution.converged = false;
+        assert!(!is_drive(&diverged) && !is_sound(&diverged) && is_sound(&fit([1.0; 3], 0.0, SOUND)));
+    }
+
+    #[test]
+    fn a_fault_makes_a_drive_of_what_was_none_or_takes_most_of_its_noise() {
+        let more = |a: &ModelFit<'_>, b: &ModelFit<'_>| is_far_more_of_a_drive(a, b);
+        let noisy = |sigma| fit([1.0; 3], 0.0, [sigma, 1e-3, 1e-3, 1e-3]);
+        // A quarter of the noise, and not more. Rejects half of it.
+        assert!(more(&noisy(0.02), &noisy(0.1)) && !more(&noisy(0.03), &noisy(0.1)));
+        // Wheels that were another robot's are those of this one; and not the other way round.
+        assert!(more(&noisy(0.1), &fit([2.0, 1.0, 1.0], 0.0, [0.1, 1e-3, 1e-3, 1e-3])));
+        assert!(!more(&fit([2.0, 1.0, 1.0], 0.0, [1e-3; 4]), &noisy(0.1)));
+    }
+
+    #[test]
+    fn implausible_geometry_costs_half_its_square_in_prior_deviations() {
+        let e = std::f64::consts::E;
+        let cost = |ratios, theta_rad| implausible(&fit(ratios, theta_rad, SOUND));
+        assert_eq!(cost([1.0; 3], 0.0), 0.0);
+        // ln 1.05 over 0.05, ln of e^0.3 over 0.3, and 0.6 rad over 0.3, each for itself.
+        let of_wheel = 0.5 * (1.05_f64.ln() / 0.05).powi(2);
+        assert!((cost([1.05, 1.0, 1.0], 0.0) - of_wheel).abs() < 1e-9);
+        assert!((cost([1.0, 1.05, 1.0], 0.0) - of_wheel).abs() < 1e-9);
+        assert!((cost([1.0, 1.0, e.powf(0.3)], 0.0) - 0.5).abs() < 1e-9);
+        assert!((cost([1.0; 3], 0.6) - 2.0).abs() < 1e-9);
+        assert!((cost([1.05, 1.05, e.powf(0.3)], -0.6) - 2.0 * of_wheel - 2.5).abs() < 1e-9);
+    }
+
+    #[test]
+    fn wheels_are_wrong_by_their_geometric_mean() {
+        let wrong = |left, right| wrong_wheels(&fit([left, right, 1.0], 0.0, SOUND));
+        assert!((wrong(2.0, 2.0).expect("too large") - 2.0).abs() < 1e-12);
+        assert!((wrong(0.5, 0.5).expect("too small") - 0.5).abs() < 1e-12);
+        // √(2 · 1) = 1.41, √(1.6 · 1) = 1.26, and one that is as much smaller. Rejects a mean of both.
+        assert!(wrong(2.0, 1.0).is_some() && wrong(1.6, 1.0).is_none() && wrong(2.0, 0.5).is_none());
+    }
+
+    #[test]
+    fn odometry_is_correlated_by_its_noise_or_by_the_wheels_that_all_determine() {
+        // Without measurements nothing determines wheels; the separation is what a robot extends at the least:
+        // 0.3 · 0.363 m.
+        let is = |sigmas| is_correlated(&fit([1.0; 3], 0.0, sigmas), &[]);
+        assert!(is([0.029, 0.149, 0.108, 0.29]));
+        for sigmas in [[0.031, 0.0, 0.0, 0.0], [0.0, 0.151, 0.0, 0.0], [0.0, 0.0, 0.11, 0.0], [0.0, 0.0, 0.0, 0.31]] {
+            assert!(!is(sigmas), "{sigmas:?}");
+        }
+        let datasets = [session(0, 0.0)];
+        let mut fit = fitted(&datasets);
+        assert!(determines_wheels(&fit, &[]) && rejected_share(&fit) == 0.0);
+        // Ten outliers of 8 · 41 poses, of which each run's first is where it starts.
+        fit.solution.pass.outliers = (0..10).map(|k| (0, k)).collect();
+        assert!((rejected_share(&fit) - 10.0 / fit.records.measurements() as f64).abs() < 1e-12);
+        assert!(!is_sound(&fit), "more than one of a hundred");
+        fit.solution.model.m_per_rad.left *= 1.2;
+        assert!(!determines_wheels(&fit, &[]), "another robot's wheels are determined by accident");
+    }
+
+    fn form(values: &[(&'static str, f64)], sentence: &str, visible_in_log: bool, runs: usize) -> RecordCorrection {
+        let mut records = session(9, 0.0);
+        records.runs.truncate(runs);
+        RecordCorrection {
+            values: values.to_vec(),
+            sentence: sentence.to_owned(),
+            visible_in_log,
+            mistakes: 2,
+            records,
+        }
+    }
+
+    #[test]
+    fn sessions_are_rewritten_alike_where_their_faults_are_the_same() {
+        let is = |a: f64, b: f64| is_same(&[("factor", a)], &[("factor", b)]);
+        // To 5 % of the first, either way.
+        assert!(is(2.0, 2.09) && is(2.0, 1.91) && !is(2.0, 2.11) && !is(2.0, 1.89) && is(-2.0, -2.05));
+        assert!(is_same(&[("probability", 0.1)], &[("probability", 0.9)]));
+        assert!(!is_same(&[("a", 1.0)], &[("b", 1.0)]) && !is_same(&[("a", 1.0)], &[]));
+        // The first session has one form, the second has it too, in other words and visibly, and one more.
+        let corrections: fn(&Dataset) -> Vec<RecordCorrection> = |dataset| match dataset.runs.len() {
+            8 => vec![form(&[("factor", 2.0)], "twice", false, 1)],
+            _ => vec![form(&[("factor", 2.05)], "double", true, 2), form(&[("factor", 4.0)], "four", false, 3)],
+        };
+        let mut second = session(1, 0.0);
+        second.runs.truncate(5);
+        let forms = batched(&[session(0, 0.0), second], corrections);
+        let [both, one] = &forms[..] else { panic!("two forms, not {}", forms.len()) };
+        assert_eq!((both.sentence.as_str(), both.visible_in_log, both.mistakes), ("twice; double", true, 2));
+        let runs = |form: &Form| form.records.iter().map(|of| of.runs.len()).collect::<Vec<_>>();
+        // The session that cannot have the second form stays as it is.
+        assert_eq!((runs(both), runs(one)), (vec![1, 2], vec![8, 3]));
+        assert_eq!((one.sentence.as_str(), one.visible_in_log), ("four", false));
+    }
+
+    #[test]
+    fn a_fault_is_sought_where_the_base_does_not_hold_and_costs_its_mistakes() {
+        let mut swapped = [session(0, 0.0)];
+        for run in &mut swapped[0].runs {
+            let dataset::WheelLog::Angles(kinematics::Wheels { left, right }) = &mut run.odometry.wheels else {
+                unreachable!("angles")
+            };
+            std::mem::swap(left, right);
+        }
+        let base = fitted(&swapped);
+        let found = fault(&swapped, Some(&base), &[], false).expect("they are swapped");
+        assert_eq!(found.id, "swapped_wheels");
+        let fit = fitted(&found.records);
+        // The gain is that of the fit to the records without it, which ends where a step gains 0.01.
+        let most = count(&base).max(count(&fit));
+        let gain = cost(&base, most) + implausible(&base) - cost(&fit, most) - implausible(&fit);
+        assert!((found.gain - gain).abs() < 0.02, "{} {gain}", found.gain);
+        // What leaves no trace is not sought in the log alone, nor where the fit is sound, nor if it is taken
+        // out.
+        assert!(fault(&swapped, Some(&base), &[], true).is_none());
+        assert!(fault(&found.records, Some(&fit), &[], false).is_none());
+        let without = fault(&swapped, Some(&base), &["swapped_wheels".to_owned()], false);
+        assert!(without.is_none_or(|other| other.id != "swapped_wheels"));
+        // Without a base fit any correction that makes a drive is a fault.
+        assert_eq!(fault(&swapped, None, &[], false).map(|of| of.id), Some("swapped_wheels"));
+    }
+
+    #[test]
+    fn records_get_the_unknown_motion_of_others() {
+        use dataset::UnknownMotion;
+        let (sound, mut other) = ([session(0, 0.0)], [session(0, 0.0)]);
+        assert!(matches!(with_unknown_motion_of(&sound, &other), Cow::Borrowed(_)));
+        other[0].runs[3].add_unknown_motion([UnknownMotion { from_s: 1.0, to_s: 2.0 }]);
+        let with = with_unknown_motion_of(&other, &sound);
+        assert!(with[0].runs[3].is_motion_unknown(1.0, 2.0) && !with[0].runs[2].is_motion_unknown(1.0, 2.0));
+    }
 }

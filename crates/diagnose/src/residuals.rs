@@ -350,4 +350,62 @@ mod tests {
         let bin = profile(&values, &[]).bins[0];
         assert!(bin.mean.abs() < 1e-15 && (bin.sigma - 1.0 / 99_f64.sqrt()).abs() < 1e-12, "{bin:?}");
     }
+
+    #[test]
+    fn edges_cut_where_values_are_apart_and_a_revolution_evenly() {
+        let of = |values: &[f64], periodic, min_span| {
+            let mut values: Vec<_> = values.iter().map(|value| (*value, 0.0, 0.0)).collect();
+            edges(&mut values, periodic, min_span)
+        };
+        // Spans of what is drawn and below it. Rejects the least value for the span.
+        assert_eq!(of(&[3.0, 1.0], false, 1.9), Some(vec![2.0]));
+        assert_eq!(
+            (of(&[1.0, 3.0], false, 2.0), of(&[5.0, 5.000_001], false, 0.0), of(&[], false, 0.0)),
+            (None, None, None)
+        );
+        // Twelve parts of 30°, the first about −180 + 15°.
+        let cut = of(&[-100.0, 100.0], true, 10.0).expect("it varies");
+        assert!(cut.len() == 12 && cut[0] == -165.0 && cut[11] == 165.0, "{cut:?}");
+        // Twelve levels are a bin each, and thirteen a continuum; levels within a millionth are one.
+        let levels = |n: u32| of(&(0..n).map(f64::from).collect::<Vec<_>>(), false, 0.0).expect("it varies");
+        assert_eq!((levels(12).len(), levels(12)[10]), (11, 10.5));
+        assert_eq!(of(&[0.0, 1e-7, 1.0], false, 0.0).map(|cut| cut.len()), Some(1));
+        // Most values at two levels and a few all over: equal widths of 1/12.
+        let mut most: Vec<f64> = [0.0, 1.0].repeat(200);
+        most.extend((0..20).map(|k| f64::from(k) / 20.0));
+        let cut = of(&most, false, 0.0).expect("it varies");
+        assert!(
+            cut.len() == 11 && (cut[0] - 1.0 / 12.0).abs() < 1e-12 && (cut[10] - 11.0 / 12.0).abs() < 1e-12,
+            "{cut:?}"
+        );
+        assert!((scatter(&[(0.0, 3.0, 0.0), (0.0, -4.0, 0.0)]) - 12.5_f64.sqrt()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_profile_tests_its_means_against_nothing_and_against_each_other() {
+        // Two bins of eight: means 1 and 3 with errors of ½ each, by residuals of ±√3.5 · ... about them.
+        let off = (8.0_f64 * 7.0 / 8.0 / 4.0).sqrt();
+        let values: Vec<(f64, f64, f64)> = (0..16)
+            .map(|k| {
+                let (at, mean) = if k < 8 { (0.0, 1.0) } else { (2.0, 3.0) };
+                (at, mean + if k % 2 == 0 { off } else { -off }, 0.5 * at)
+            })
+            .collect();
+        let of = profile(&values, &[1.0]);
+        let [low, high] = &of.bins[..] else { panic!("two bins") };
+        assert!((low.sigma - 0.5).abs() < 1e-12 && (high.mean - 3.0).abs() < 1e-12, "{of:?}");
+        assert_eq!((low.count, high.at, high.mean_z), (8, 2.0, 1.0));
+        // (1² + 3²)/¼ about nothing, and 2 · 1²/¼ about the mean of 2.
+        assert!((of.chi_square - 40.0).abs() < 1e-9 && (of.varies_chi_square - 8.0).abs() < 1e-9, "{of:?}");
+        assert!(
+            (of.p_value - (-20.0_f64).exp()).abs() < 1e-12
+                && (of.varies_p_value - p_of_chi_square(8.0, 1.0)).abs() < 1e-12
+        );
+        // Seven are too few; one bin does not vary.
+        let one = profile(&values[1..], &[1.0]);
+        assert_eq!((one.bins.len(), one.varies_p_value), (1, 1.0));
+        // Bins without scatter have no weight.
+        let still = profile(&[(0.0, 1.0, 0.0); 8], &[]);
+        assert_eq!((still.chi_square, still.varies_chi_square), (0.0, 0.0));
+    }
 }

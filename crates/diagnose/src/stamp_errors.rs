@@ -38,6 +38,13 @@ struct Explained {
 }
 
 impl StampError {
+    /// One that counts show by themselves, of records that a test does not ask for.
+    #[cfg(test)]
+    pub(crate) fn of_test(candidate: Candidate, is_undone_roughly: bool) -> Self {
+        let test = Test { statistic: 100.0, p_value: 1e-20, estimates: vec![(0.9, 0.01)] };
+        Self { candidate, test, records: Vec::new(), is_undone_roughly, log_odds: 50.0, explained: None }
+    }
+
     /// Whether the records without it are about as likely as those with it beside the linear term.
     pub(crate) fn is_undone_by(&self, restamped: &ModelFit<'_>) -> bool {
         let Some(explained) = &self.explained else { return true };

@@ -121,4 +121,74 @@ mod tests {
         assert!((sidak(0.01, 1) - 0.01).abs() < 1e-15);
         assert!((sidak(1e-12, 40) - 4e-11).abs() < 1e-20);
     }
+
+    fn is_near(found: f64, expected: f64) -> bool {
+        (found - expected).abs() < 1e-6 * expected.abs()
+    }
+
+    #[test]
+    fn a_score_of_few_observations_has_the_tail_of_the_regression_that_it_is() {
+        // 5 of 10 explained, 6 − 1 values left: F = 5 · 0.5/0.5 = 5, or t = √5 with five degrees of freedom, of
+        // which both tails are 1/2 − 4/(3π). Rejects the χ² of 5, and a count in the place of what is left.
+        let expected = 0.5 - 4.0 / (3.0 * std::f64::consts::PI);
+        assert!(is_near(p_of_score(5.0, 1, 10.0, 6.0), expected));
+        assert!(is_near(p_of_statistic(5.0, 1, 5.0), expected));
+        // Two dimensions share the statistic: F of 2 and 2 at 3 has the tail 1/(1 + 3).
+        assert!(is_near(p_of_statistic(6.0, 2, 2.0), 0.25));
+        // As large as the count it may not be, but for roundings: the least of probabilities.
+        assert!(p_of_score(10.0, 1, 10.0, 6.0) < 1e-15 && p_of_score(20.0, 1, 10.0, 6.0) < 1e-15);
+        assert!(is_near(p_of_score(-5.0, 1, 10.0, 6.0), 1.0));
+    }
+
+    #[test]
+    fn what_is_no_test_has_the_probability_one() {
+        for p in [
+            p_of_statistic(5.0, 0, 5.0),
+            p_of_statistic(f64::NAN, 1, 5.0),
+            p_of_statistic(-1.0, 1, 5.0),
+            p_of_score(5.0, 0, 10.0, 6.0),
+            p_of_score(f64::NAN, 1, 10.0, 6.0),
+            // One direction tested of 1.5 values leaves a half of one.
+            p_of_score(5.0, 1, 10.0, 1.5),
+            p_of_chi_square(-1.0, 2.0),
+            p_of_student(f64::NAN, 3.0),
+            p_of_upper_student(f64::NAN, 3.0),
+        ] {
+            assert_eq!(p, 1.0);
+        }
+        // Of two values one is left, which is enough: F of 1 and 1 at 1.
+        assert!(is_near(p_of_score(5.0, 1, 10.0, 2.0), 0.5));
+    }
+
+    #[test]
+    fn tails_of_students_and_of_chi_square_are_those_of_closed_forms() {
+        // Cauchy's distribution at 1: a quarter above. Rejects tails of one side for two, and of −t for t.
+        assert!(is_near(p_of_student(1.0, 1.0), 0.5) && is_near(p_of_student(-1.0, 1.0), 0.5));
+        assert!(is_near(p_of_upper_student(1.0, 1.0), 0.25) && is_near(p_of_upper_student(-1.0, 1.0), 0.75));
+        // No distribution has less than one degree of freedom.
+        assert!(is_near(p_of_student(1.0, 0.0), 0.5) && is_near(p_of_upper_student(1.0, 0.0), 0.25));
+        assert!(is_near(p_of_chi_square(3.0, 2.0), f64::exp(-1.5)));
+        assert!(is_near(p_of_chi_square(3.841_459, 0.0), 0.05));
+        // Tables of Student's distribution.
+        assert!((student_95(1.0) - 12.706).abs() < 1e-3 && (student_95(0.0) - 12.706).abs() < 1e-3);
+        assert!((student_95(2.0) - 4.3027).abs() < 1e-4 && (student_95(1000.0) - 1.9623).abs() < 1e-4);
+    }
+
+    #[test]
+    fn quantiles_of_upper_tails_have_the_sign_of_their_side() {
+        let upper = |z: f64| 0.5 * p_of_z(z);
+        assert!((z_of_upper(upper(2.0)) - 2.0).abs() < 1e-6 && (z_of_upper(1.0 - upper(2.0)) + 2.0).abs() < 1e-6);
+        assert!(z_of_upper(0.5).abs() < 1e-9);
+        assert!(z_of_upper(0.0) > 30.0 && z_of_upper(1.0) < -6.0 && z_of_upper(1.0).is_finite());
+        assert!(is_near(p_of_z(-1.959_964), 0.05) && z_of_p(0.0) > 30.0);
+    }
+
+    #[test]
+    fn many_trials_make_anything_likely_and_the_last_of_holms_order_pays_for_itself_alone() {
+        // 1 − 0.9³ = 0.271. Rejects 3 · 0.1.
+        assert!(is_near(sidak(0.1, 3), 0.271) && sidak(1.0, 5) <= 1.0 && sidak(1.0, 5) > 0.999);
+        // 0.02 · 3 is above 0.05 where 0.001 came before it: all after it pass too.
+        assert_eq!(holm(&[0.001, 0.02, 0.02, 0.03], 0.05), [true, false, false, false]);
+        assert_eq!(holm(&[0.05], 0.05), [true]);
+    }
 }

@@ -302,3 +302,6 @@ pub(crate) fn summary(findings: &[Finding], gain: Option<&Gain>) -> String {
         Verdict::Unlisted => format!("found, and not all of it is in the catalogue: {}{gains}", names.join(", ")),
     }
 }
+
+#[cfg(test)]
+mod tests;

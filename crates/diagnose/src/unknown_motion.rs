@@ -243,4 +243,61 @@ mod tests {
         assert_eq!(place[0].kind, AnomalyKind::ExtrinsicPosition);
         assert!((place[0].displacement.x_m - 0.03).abs() < 0.005, "{:?}", place[0].displacement);
     }
+
+    #[test]
+    fn regress_no_number_of_what_happens_in_a_run_moves() {
+        let mut text = String::new();
+        for (name, happens) in [
+            ("carried ahead", Happens::Carried(Pose::new(0.2, -0.1, 0.3), 5)),
+            ("carried aside in a row", Happens::Carried(Pose::new(0.0, 0.05, 0.0), 1)),
+            ("turned for long", Happens::Carried(Pose::new(0.0, 0.0, 0.5), 12)),
+            ("frame", Happens::FrameMoves(Pose::new(0.3, 0.2, 0.1))),
+            ("frame that turns", Happens::FrameMoves(Pose::new(0.0, 0.0, -0.4))),
+            ("elsewhere", Happens::Elsewhere(Pose::new(0.09, -0.02, 0.1))),
+            ("turned elsewhere", Happens::Elsewhere(Pose::new(0.05, 0.02, 0.2))),
+            ("both", Happens::Elsewhere(Pose::new(0.08, 0.02, 0.15))),
+        ] {
+            let found = unknown_motions(&[driven(Some(happens))], 0.0, 0.0);
+            let spans = |of: &UnknownMotions| -> Vec<usize> {
+                of.records[0].runs.iter().map(|run| run.unknown_motion.len()).collect()
+            };
+            text += &format!("{name}: {:?}\n", found.map(|of| (spans(&of), of.anomalies)));
+        }
+        let datasets = [driven(Some(Happens::Elsewhere(Pose::new(0.08, 0.02, 0.15))))];
+        let tracks = PoseTrack::of_all(&datasets, 0.03);
+        let calibrated = CalibratedTracks::of(&tracks, SEPARATION_M).expect("determined");
+        // Wheels are an eightieth larger, and the instrument is where it is: the windows say so to a part in a
+        // hundred.
+        let at = calibrated.body_from_sensor;
+        assert!(
+            (at.x_m - 0.05).abs() < 5e-3 && (at.y_m - 0.02).abs() < 5e-3 && (at.theta_rad - 0.1).abs() < 2e-2,
+            "{at:?}"
+        );
+        text += &format!("at: {at:?}, span {}\n", calibrated.span);
+        for window in [(0, 1), (3, 11), (50, 82)] {
+            text += &format!("{window:?}: {:?}\n", [0, 3].map(|track| calibrated.residual(track, window)));
+        }
+        for track in [0, 3] {
+            let all = calibrated.extrinsics(track, |_| true);
+            text += &format!("{all:?} {:?}\n", calibrated.extrinsics(track, |(from, _)| from < 100));
+            text += &format!("{:?}\n", &calibrated.poses(track)[190..192]);
+        }
+        assert!(calibrated.extrinsics(0, |(from, _)| from < 4).is_none(), "too few windows");
+        crate::tests::assert_unmoved("windows.txt", &text);
+    }
+
+    #[test]
+    fn where_much_is_beyond_wheels_nothing_is() {
+        // Something happens in so many runs, once each; eight runs of 20 s may have sixteen events, and a tenth
+        // of 1600 pairs may be spoiled.
+        let with = |runs: usize, rows: usize| {
+            let by = Pose::new(0.2, -0.1, 0.3);
+            let (mut all, carried) = (driven(None), driven(Some(Happens::Carried(by, rows))));
+            all.runs[..runs].iter_mut().for_each(|run| run.truth.clone_from(&carried.runs[3].truth));
+            unknown_motions(&[all], 0.0, 0.0).map(|of| of.anomalies.len())
+        };
+        assert_eq!((with(2, 3), with(5, 3)), (Some(2), Some(5)));
+        // 25 rows in each of seven runs are more than a tenth.
+        assert_eq!(with(7, 25), None);
+    }
 }

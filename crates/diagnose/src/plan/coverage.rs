@@ -405,3 +405,6 @@ fn noise(scenario: &Scenario) -> Option<Noise> {
     let sigmas = [scenario.noise.wheel_sigma_m_per_sqrt_m, MIN_NOISE_SIGMA, xy_m, theta_rad];
     Some(Noise { variance: sigmas.map(|sigma| sigma.max(MIN_NOISE_SIGMA).powi(2)), timing_s2: 0.0 })
 }
+
+#[cfg(test)]
+mod tests;

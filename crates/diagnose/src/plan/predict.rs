@@ -197,3 +197,19 @@ impl PlannedRun {
 fn column_at(index: usize) -> Column {
     Column::BASE.get(index).copied().unwrap_or_else(|| Column::Term(index - Column::BASE.len()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn measurements_of_a_direction_and_an_instant_are_those_of_all_phases() {
+        // Twelve instants and four phases: the second direction's third instant is that of runs 4 to 7.
+        assert_eq!(phases_at(14).collect::<Vec<_>>(), [50, 62, 74, 86]);
+        assert_eq!(phases_at(0).collect::<Vec<_>>(), [0, 12, 24, 36]);
+        let shares = shares();
+        assert!((shares[0] - 1.0 / 12.0).abs() < 1e-12 && shares[11] == 1.0);
+        assert_eq!(column_at(2), Column::BASE[2]);
+        assert_eq!(column_at(Column::BASE.len() + 3), Column::Term(3));
+    }
+}

@@ -311,4 +311,36 @@ pub(super) mod tests {
             assert!((0.033..0.067).contains(&share), "{root} ± {sigma}: {share}");
         }
     }
+
+    #[test]
+    fn a_pair_is_as_well_told_as_the_worse_of_both_ways() {
+        let of = |sigmas, even, certain| PairDiscrimination { sigmas, even, certain };
+        assert_eq!(of(1.0, 5.0, 2.0).or_worse(of(2.0, 4.0, 3.0)), of(1.0, 4.0, 2.0));
+        assert_eq!((of(1.0, 5.0, 2.0).margin(Confidence::P50), of(1.0, 5.0, 2.0).margin(Confidence::P95)), (5.0, 2.0));
+        // Known for certain, λ/2 is exceeded but for the measurements' own error. Rejects one of two sides.
+        assert!((certain_log_odds(6.0, 0.0) - (18.0 - 1.645 * 6.0)).abs() < 1e-9);
+        // A size that may be nothing leaves nothing.
+        assert!(certain_log_odds(1.0, 10.0) <= 0.0 && certain_log_odds(0.0, 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_frame_weighs_what_is_plausible_and_takes_out_what_is_free() {
+        let prior = DVector::from_column_slice(&[0.0, 1.0, 0.0]);
+        let frame = Frame { free: vec![0], prior };
+        let slopes = DMatrix::from_row_slice(3, 3, &[2.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1.0, 0.0]);
+        let equations = normal_equations(&slopes, &DVector::from_column_slice(&[2.0, 4.0, 0.0]));
+        // Column 1 alone: (1·4 + 1·0)/(1 + 1 + 1), with its prior of 1.
+        let (step, covariance) = frame.estimate(&equations, &[1]).expect("determined");
+        assert!((step[0] - 4.0 / 3.0).abs() < 1e-9 && (covariance[(0, 0)] - 1.0 / 3.0).abs() < 1e-9);
+        // Column 1 has 2, of which column 0 explains 1·1/5.
+        let information = frame.information(&equations, &[1], &[0]).expect("determined");
+        assert!((information[(0, 0)] - 1.8).abs() < 1e-9, "{information}");
+        let columns = RivalColumns {
+            candidate: Candidate::Effect { id: "slip_speed", variant: 0, at: None },
+            columns: vec![2, 1],
+        };
+        assert_eq!(frame.with(&columns), [0, 2, 1]);
+        let twice = with_runs(&equations, &[(&equations, 2.0), (&equations, -1.0)]);
+        assert!((twice.information[(0, 0)] - 10.0).abs() < 1e-12);
+    }
 }

@@ -171,3 +171,84 @@ pub(super) fn next_experiment(
         within: setting.within.clone(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn manoeuvres() -> [Schedule; 6] {
+        [
+            Schedule::Straights { length_m: 1.5, runs: 2 },
+            Schedule::Spins { turn_rad: TAU, runs: 2 },
+            Schedule::Spins { turn_rad: 3.0 * TAU, runs: 2 },
+            Schedule::Squares { side_m: 1.2, runs_each_way: 1 },
+            Schedule::Circles { radius_m: 0.6, turns: None, runs_each_way: 1 },
+            Schedule::ValidationPath { length_m: 20.0, measure_every_m: 1.0, runs: 1 },
+        ]
+    }
+
+    #[test]
+    fn what_is_driven_is_said_with_its_sizes_and_its_directions() {
+        let said = manoeuvres().map(|schedule| kind(&schedule));
+        assert_eq!(said[0], "straights of 1.50 m, forward and backward in turn");
+        assert_eq!(said[1], "spins of a turn on the spot, counter-clockwise and clockwise in turn");
+        assert_eq!(said[2], "spins of 3 turns on the spot, counter-clockwise and clockwise in turn");
+        assert_eq!(said[3], "squares with sides of 1.20 m, clockwise and counter-clockwise in turn");
+        assert_eq!(said[4], "circles with a radius of 0.60 m, clockwise and counter-clockwise in turn");
+        assert_eq!(said[5], "validation paths of 20 m");
+        let both = manoeuvres().map(|schedule| [0, 1].map(|number| direction(&schedule, number)));
+        assert_eq!(both[0], ["forward", "backward"]);
+        assert_eq!(both[1], ["counter-clockwise", "clockwise"]);
+        assert_eq!((both[3], both[4]), (["clockwise", "counter-clockwise"], ["clockwise", "counter-clockwise"]));
+        assert_eq!(both[5], ["validation", "validation"]);
+        let nouns = manoeuvres().map(|schedule| noun(&schedule));
+        assert_eq!(nouns, ["straights", "spins", "spins", "squares", "circles", "paths"]);
+        let at_speeds = Schedule::SpinsAtSpeeds {
+            turn_rad: 2.0 * TAU,
+            slowest_m_s: 0.1,
+            fastest_m_s: 0.3,
+            speeds: 2,
+            runs_each_way: 1,
+        };
+        assert_eq!(kind(&at_speeds), "spins of 2 turns on the spot at 0.1 to 0.3 m/s, both ways");
+    }
+
+    #[test]
+    fn an_offset_has_the_digits_of_its_error_and_a_side() {
+        let of = |value: f64, sigma: f64, component: &str| {
+            offset(&Value { value, sigma: Some(sigma), unit: String::new() }, component)
+        };
+        assert_eq!(of(0.0123, 0.002, "along"), "12 ± 2 mm ahead");
+        assert_eq!(of(-0.0123, 0.0012, "across"), "12.3 ± 1.2 mm to the right");
+        assert_eq!(of(0.01234, 0.000_12, "across"), "12.34 ± 0.12 mm to the left");
+        assert_eq!(of(-0.5, 0.01, "heading"), "500 ± 10 mrad turned to the right");
+        assert_eq!(
+            (of(0.0, 1.0, "heading").as_str(), of(-0.001, 0.01, "along").as_str()),
+            ("0 ± 1000 mrad turned to the left", "1 ± 10 mm short")
+        );
+    }
+
+    #[test]
+    fn a_plan_says_where_to_measure_and_what_floor_it_needs() {
+        let part = |schedule, speed_m_s| Part { manoeuvre: Manoeuvre { schedule, speed_m_s }, pairs: 3 };
+        let straight = part(manoeuvres()[0], 0.25);
+        let at = |share| where_to_measure(&straight, &Where { direction: 1, share, component: 0 });
+        assert!(at(1.0).starts_with(" Predicted is, at the end of the backward straights"), "{}", at(1.0));
+        assert!(at(0.5).starts_with(" Predicted is, after 50 % of the time of the backward"), "{}", at(0.5));
+        let parts = [straight, part(manoeuvres()[4], 0.125), part(manoeuvres()[3], 0.25), part(manoeuvres()[1], 0.25)];
+        let setting = crate::plan::manoeuvres::tests::setting();
+        let plan = next_experiment(&parts, &setting, 4.0, "why", Predictions::Sizes(BTreeMap::new()));
+        // Six runs of each of four kinds; the straights are the longest along x, and squares and circles are
+        // 1.2 m wide.
+        assert_eq!((plan.runs, plan.minutes, plan.free_x_m, plan.free_y_m), (24, 4.0, 1.5, 1.2));
+        // A session for each speed, the faster first.
+        let speeds: Vec<(f64, usize)> = plan.sessions.iter().map(|of| (of.speed_m_s, of.schedules.len())).collect();
+        assert_eq!(speeds, [(0.25, 3), (0.125, 1)]);
+        let first = plan.protocol.lines().next().expect("a line");
+        assert_eq!(first, "# [robot] cruise_speed_m_s = 0.25");
+        assert!(plan.protocol.contains("[[protocol]]\nkind = \"circles\""), "{}", plan.protocol);
+        assert!(plan.drive.starts_with("6 straights of 1.50 m, forward and backward in turn at 0.25 m/s; 6 circles"));
+        assert_eq!(plan.why, format!("{}: why", plan.drive));
+        assert_eq!((plan.predicts.len(), plan.predicted), (0, None));
+    }
+}
