@@ -68,7 +68,7 @@ fn a_clock_of_all_runs_joins_what_was_found_of_it_and_that_of_a_run_does_not() {
         clocks(&StageResults { clocks: offsets, ..results(&datasets, &structure) }, before)
     };
     // Beside nothing it is a finding; beside the same effect it is a part of it.
-    assert_eq!(results_of(&of_all, vec![]), [late.clone()]);
+    assert_eq!(results_of(&of_all, vec![]), std::slice::from_ref(&late));
     let joined = results_of(&of_all, vec![late.clone()]);
     assert_eq!((joined.len(), joined[0].parameters["delay_s"].value), (1, 0.6));
     let of_run = results_of(&[offset(Some(vec!["run-1".to_owned()]))], vec![late.clone()]);
