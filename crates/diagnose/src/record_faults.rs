@@ -455,10 +455,11 @@ mod tests {
         let found = fault(&swapped, Some(&base), &[], false).expect("they are swapped");
         assert_eq!(found.id, "swapped_wheels");
         let fit = fitted(&found.records);
-        // The gain is that of the fit to the records without it, which ends where a step gains 0.01.
+        // The gain is that of the fit to the records without it, which ends where a step gains less than 0.01:
+        // what further steps would have gained is a few times that.
         let most = count(&base).max(count(&fit));
         let gain = cost(&base, most) + implausible(&base) - cost(&fit, most) - implausible(&fit);
-        assert!((found.gain - gain).abs() < 0.02, "{} {gain}", found.gain);
+        assert!((found.gain - gain).abs() < 0.05, "{} {gain}", found.gain);
         // What leaves no trace is not sought in the log alone, nor where the fit is sound, nor if it is taken
         // out.
         assert!(fault(&swapped, Some(&base), &[], true).is_none());
