@@ -263,7 +263,7 @@ impl Detectability {
             Asked::All => true,
             Asked::One(one) => one == id,
         };
-        for id in CATALOGUE.into_iter().filter(|id| is_asked(id)) {
+        for id in CATALOGUE.iter().filter(|id| is_asked(id)) {
             let Some(variants) = hypothesis(id).and_then(Hypothesis::into_variants) else { continue };
             for variant in variants {
                 let parameters = variant.term.parameters().to_vec();

@@ -7,8 +7,6 @@
 //! itself, and what waited behind it. The numbers are the likeliest path through both (Viterbi 1967), each
 //! path with its own idea of how late rows usually are, so that a clock need not keep one beat all day.
 
-use kinematics::sin_cos;
-
 use crate::receipt_delays::Received;
 
 /// Rows from which on a log has a beat: the line through so many is off by a fifth of what stamps jitter by.
@@ -140,7 +138,7 @@ fn first_periods(t_s: &[f64]) -> Option<[f64; 2]> {
         let every = (t_s.len() / PHASES_TAKEN).max(1);
         let spans: Vec<f64> = t_s.windows(rows + 1).step_by(every).map(|of| of[rows] - of[0]).collect();
         let agreement = |period_s: f64| -> f64 {
-            spans.iter().map(|span_s| sin_cos(std::f64::consts::TAU * span_s / period_s).1).sum()
+            spans.iter().map(|span_s| kinematics::sin_cos(std::f64::consts::TAU * span_s / period_s).1).sum()
         };
         let at = |step: u32| found_s * (low + (high - low) * f64::from(step) / f64::from(steps));
         let best = (0..=steps).map(|step| (at(step), agreement(at(step)))).max_by(|a, b| a.1.total_cmp(&b.1));
