@@ -128,8 +128,9 @@ mod tests {
 
     #[test]
     fn a_score_of_few_observations_has_the_tail_of_the_regression_that_it_is() {
-        // 5 of 10 explained, 6 − 1 values left: F = 5 · 0.5/0.5 = 5, or t = √5 with five degrees of freedom, of
-        // which both tails are 1/2 − 4/(3π). Rejects the χ² of 5, and a count in the place of what is left.
+        // 5 of 10 explained, 6 − 1 values left: F = 5 · 0.5/0.5 = 5, or t = √5 with five degrees of freedom,
+        // of which both tails are 1/2 − 4/(3π). Rejects the χ² of 5, and a count in the place of what is
+        // left.
         let expected = 0.5 - 4.0 / (3.0 * std::f64::consts::PI);
         assert!(is_near(p_of_score(5.0, 1, 10.0, 6.0), expected));
         assert!(is_near(p_of_statistic(5.0, 1, 5.0), expected));
