@@ -111,8 +111,8 @@ fn regress_no_number_moves_where_something_is_not_to_be_named_and_floor_and_time
     let limits = Limits { room_m: Some([2.0, 1.5]), minutes: Some(4.0), top_speed_m_s: Some(0.3) };
     let without = ["swapped_wheels", "wheel_scale", "truth_jump"].map(ToOwned::to_owned).to_vec();
     let stages = Arc::new(Mutex::new(String::new()));
-    let told = Arc::clone(&stages);
-    let on_stage = OnStage::call(move |stage| told.lock().expect("one thread").push_str(&format!("{stage:?}\n")));
+    let reported = Arc::clone(&stages);
+    let on_stage = OnStage::call(move |stage| reported.lock().expect("one thread").push_str(&format!("{stage:?}\n")));
     let options = Options { without, limits: Some(limits), on_stage };
     let mut text = String::new();
     for (name, dataset) in other_logs().into_iter().filter(|(name, _)| ["swapped", "moved run"].contains(name)) {

@@ -247,8 +247,9 @@ fn scatter(z: &[((usize, usize), f64)]) -> f64 {
 }
 
 impl Detectability {
-    /// Noise-free runs under the estimation models of the effects that are asked for. `without` are the same runs without the
-    /// effect: what they show, rounded counts and measurements between two rows, is not the effect's.
+    /// Noise-free runs under the estimation models of the effects that are asked for. `without` are the same
+    /// runs without the effect: what they show, rounded counts and measurements between two rows, is not the
+    /// effect's.
     pub(crate) fn of(
         datasets: &[Dataset],
         without: &[Dataset],

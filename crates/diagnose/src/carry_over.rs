@@ -389,8 +389,8 @@ pub(crate) mod tests {
         assert_eq!(both, (None, "2 of 2 by session; too weak in session b".to_owned()));
         let (all, why) = verdict(&[sessions(vec![agrees(), agrees(), weak("b", 1.0)])]);
         assert!(all == Some(true) && why.ends_with("of the size: 2 of 3 by session"), "{why}");
-        // A unit that is 1.7 below nothing is none of three by chance: 0.045 · 3. Rejects each for itself, and
-        // one that is as far above.
+        // A unit that is 1.7 below nothing is none of three by chance: 0.045 · 3. Rejects each for itself,
+        // and one that is as far above.
         let below = |z: f64| unit("b", (0.4, 0.1), (-0.1 * z, 0.1));
         assert_eq!(verdict(&[sessions(vec![agrees(), below(1.7), agrees()])]).0, None);
         assert_eq!(verdict(&[sessions(vec![agrees(), below(2.2), agrees()])]).0, Some(false));
@@ -434,9 +434,9 @@ pub(crate) mod tests {
 
     #[test]
     fn shares_are_fitted_together_with_what_units_have_in_common() {
-        // The sum over the shared column and those of two units is [[2, 1, −1], [1, 2, 0], [−1, 0, 2]] with the
-        // gradient (0, −1, 1): steps −1, 1, −1, and a covariance of the units of [[3, −1], [−1, 3]]/4. Rejects
-        // the units by themselves, ½ and a variance of ½.
+        // The sum over the shared column and those of two units is [[2, 1, −1], [1, 2, 0], [−1, 0, 2]] with
+        // the gradient (0, −1, 1): steps −1, 1, −1, and a covariance of the units of [[3, −1], [−1, 3]]/4.
+        // Rejects the units by themselves, ½ and a variance of ½.
         let (a, b) = ([1.0, 1.0, 1.0, 2.0], [1.0, -1.0, -1.0, 2.0]);
         let system = system(1, &[(&a, &[0.0, -1.0]), (&b, &[0.0, 1.0]), (&b, &[9.0, 9.0])]);
         let unit = |(_, run): (usize, usize)| [Some(0), Some(1), None][run];
@@ -449,8 +449,8 @@ pub(crate) mod tests {
 
     #[test]
     fn runs_that_scatter_beyond_the_noise_widen_the_shares_where_there_are_enough_of_them() {
-        // Of each of two units four runs with information 1 and scores of 3, either way: without the run in the
-        // fit 4, so that the variance is 7/8 · 64/16. The noise alone makes ¼.
+        // Of each of two units four runs with information 1 and scores of 3, either way: without the run in
+        // the fit 4, so that the variance is 7/8 · 64/16. The noise alone makes ¼.
         let scores = |score: f64| [[score], [-score]].concat().repeat(4);
         let variance = |score: f64, runs: usize| {
             let gradients: Vec<Vec<f64>> = scores(score).iter().map(|of| vec![*of]).collect();
@@ -464,7 +464,7 @@ pub(crate) mod tests {
 
     #[test]
     fn a_unit_has_its_runs_and_its_name() {
-        use crate::tests::{fitted, session};
+        use crate::small_robot::{fitted, session};
         let datasets = [session(0, 0.0), session(1, 0.0), session(2, 0.0)];
         let model = AugmentedModel::base(&fitted(&datasets));
         let names = ["a", "b", "a"].map(ToOwned::to_owned);
@@ -480,7 +480,7 @@ pub(crate) mod tests {
 
     #[test]
     fn regress_no_number_of_a_carry_over_moves() {
-        use crate::tests::{assert_unmoved, fitted, session, with_effects};
+        use crate::small_robot::{assert_unmoved, fitted, session, with_effects};
         // The third session has a third of what the others have.
         let datasets = [session(0, 0.1), session(1, 0.1), session(2, 0.03)];
         let names = ["a", "b", "c"].map(ToOwned::to_owned);

@@ -441,7 +441,7 @@ pub(crate) mod tests {
             let of = Profile::of(run, &dataset, &geometry).expect("it drives");
             text += &format!("{:?} {} {}\n", of.costs, of.offset_s, of.sigma_s);
         }
-        crate::tests::assert_unmoved("clocks.txt", &text);
+        crate::small_robot::assert_unmoved("clocks.txt", &text);
     }
 
     #[test]

@@ -248,7 +248,7 @@ fn is_of_sizes(form: &RecordCorrection, sizes: &[(String, f64)]) -> bool {
 mod tests {
     use super::*;
 
-    const SCENARIO: &str = include_str!("../../../scenarios/motion-capture.toml");
+    const SCENARIO: &str = crate::small_robot::MOTION_CAPTURE;
 
     fn scenario(effects: &str) -> Scenario {
         let (head, _) = SCENARIO.split_once("[[effect]]").expect("effects");
@@ -280,7 +280,7 @@ mod tests {
         let [left, right] = ["left_wheel_diameter_m", "right_wheel_diameter_m"].map(|key| values[key]);
         assert!((right / left - 0.998).abs() < 1e-9 && (left + right - 0.3232).abs() < 1e-3, "{values:?}");
         assert!(!of.changes_records() && of.remarks.is_empty());
-        let robot = crate::tests::session(0, 0.0).robot;
+        let robot = crate::small_robot::session(0, 0.0).robot;
         assert!(of.check(&robot).is_ok());
         let other = NominalRobot { wheel_separation_m: 9.0, ..robot };
         assert!(matches!(of.check(&other), Err(ExtendedModelError::OtherRobot(_))));
@@ -294,7 +294,7 @@ mod tests {
         let of = of.expect("a model");
         assert!(of.changes_records() && of.calibration.terms.is_empty());
         assert_eq!(of.remarks.len(), 1);
-        let sound = crate::tests::session(0, 0.0);
+        let sound = crate::small_robot::session(0, 0.0);
         let (records, remarks) = of.undone(&sound).expect("any log may be swapped");
         let [before, after] = [&sound, &records].map(|dataset| match &dataset.runs[1].odometry.wheels {
             dataset::WheelLog::Angles(angles) => angles.left.clone(),
@@ -314,7 +314,7 @@ mod tests {
             sentence: String::new(),
             visible_in_log: false,
             mistakes: 1,
-            records: crate::tests::session(0, 0.0),
+            records: crate::small_robot::session(0, 0.0),
         };
         let sizes = [("factor".to_owned(), 2.0), ("side".to_owned(), -1.0)];
         assert!(is_of_sizes(&form(&[("factor", 2.09)]), &sizes) && !is_of_sizes(&form(&[("factor", 2.11)]), &sizes));

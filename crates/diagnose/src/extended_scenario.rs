@@ -262,7 +262,7 @@ mod tests {
     #[test]
     fn what_was_driven_is_driven_again_as_often() {
         let of = |runs: &[(Option<Protocol>, f64)]| {
-            let mut dataset = crate::tests::session(0, 0.0);
+            let mut dataset = crate::small_robot::session(0, 0.0);
             dataset.runs = runs.iter().map(|(protocol, size)| info(*protocol, *size)).collect();
             protocols(&[dataset])
         };
@@ -301,7 +301,7 @@ mod tests {
 
     #[test]
     fn the_robot_as_found_has_the_calibrated_ratios() {
-        use crate::tests::{fitted, session};
+        use crate::small_robot::{fitted, session};
         let datasets = [session(0, 0.0)];
         let mut model = AugmentedModel::base(&fitted(&datasets));
         model.fit.solution.model.m_per_rad = kinematics::Wheels { left: 0.09, right: 0.081 };

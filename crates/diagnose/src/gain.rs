@@ -341,18 +341,19 @@ mod tests {
 
     #[test]
     fn runs_of_each_protocol_are_in_every_fold_and_blocks_in_turn() {
-        use crate::tests::{fitted, session};
+        use crate::small_robot::{fitted, session};
         let datasets = [session(0, 0.0)];
         let fit = fitted(&datasets);
         let units = &fit.solution.pass.runs;
-        // Two straights, two spins and four squares, in the order straight, spin, square, square: of six folds.
+        // Two straights, two spins and four squares, in the order straight, spin, square, square: of six
+        // folds.
         assert_eq!(folds(&fit, units, false), [0, 2, 4, 0, 1, 3, 5, 1]);
         assert_eq!(folds(&fit, units, true), [0, 1, 2, 3, 4, 5, 0, 1]);
     }
 
     #[test]
     fn priors_are_of_terms_and_where_kinds_are_held_out_of_lengths() {
-        use crate::tests::{effect, fitted, session, with_effects};
+        use crate::small_robot::{effect, fitted, session, with_effects};
         let datasets = [session(0, 0.1)];
         let model = with_effects(&fitted(&datasets), &["slip_speed"]);
         let terms = terms(&model.candidates);

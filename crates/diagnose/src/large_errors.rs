@@ -104,7 +104,7 @@ mod tests {
     use super::*;
     use crate::candidate::terms;
     use crate::outlier_attribution::tests::driven;
-    use crate::tests::{assert_unmoved, fitted};
+    use crate::small_robot::{assert_unmoved, fitted};
 
     fn large(travel_m: [f64; 2], [from_s, at_s]: [f64; 2]) -> LargeError {
         LargeError {

@@ -65,6 +65,8 @@ mod unknown_motion;
 mod wald;
 
 #[cfg(test)]
+mod small_robot;
+#[cfg(test)]
 mod tests;
 
 pub use alternatives::{Alternative, Status};

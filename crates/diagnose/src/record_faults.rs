@@ -312,7 +312,7 @@ mod tests {
 
     use estimation::Noise;
 
-    use crate::tests::{fitted, session};
+    use crate::small_robot::{fitted, session};
 
     /// A fit without measurements: wheels and separation over nominal, the instrument's heading, and standard
     /// deviations of the noise.
@@ -389,8 +389,8 @@ mod tests {
 
     #[test]
     fn odometry_is_correlated_by_its_noise_or_by_the_wheels_that_all_determine() {
-        // Without measurements nothing determines wheels; the separation is what a robot extends at the least:
-        // 0.3 · 0.363 m.
+        // Without measurements nothing determines wheels; the separation is what a robot extends at the
+        // least: 0.3 · 0.363 m.
         let is = |sigmas| is_correlated(&fit([1.0; 3], 0.0, sigmas), &[]);
         assert!(is([0.029, 0.149, 0.108, 0.29]));
         for sigmas in [[0.031, 0.0, 0.0, 0.0], [0.0, 0.151, 0.0, 0.0], [0.0, 0.0, 0.11, 0.0], [0.0, 0.0, 0.0, 0.31]] {

@@ -266,8 +266,8 @@ mod tests {
         let datasets = [driven(Some(Happens::Elsewhere(Pose::new(0.08, 0.02, 0.15))))];
         let tracks = PoseTrack::of_all(&datasets, 0.03);
         let calibrated = CalibratedTracks::of(&tracks, SEPARATION_M).expect("determined");
-        // Wheels are an eightieth larger, and the instrument is where it is: the windows say so to a part in a
-        // hundred.
+        // Wheels are an eightieth larger, and the instrument is where it is: the windows say so to a part in
+        // a hundred.
         let at = calibrated.body_from_sensor;
         assert!(
             (at.x_m - 0.05).abs() < 5e-3 && (at.y_m - 0.02).abs() < 5e-3 && (at.theta_rad - 0.1).abs() < 2e-2,
@@ -283,13 +283,13 @@ mod tests {
             text += &format!("{:?}\n", &calibrated.poses(track)[190..192]);
         }
         assert!(calibrated.extrinsics(0, |(from, _)| from < 4).is_none(), "too few windows");
-        crate::tests::assert_unmoved("windows.txt", &text);
+        crate::small_robot::assert_unmoved("windows.txt", &text);
     }
 
     #[test]
     fn where_much_is_beyond_wheels_nothing_is() {
-        // Something happens in so many runs, once each; eight runs of 20 s may have sixteen events, and a tenth
-        // of 1600 pairs may be spoiled.
+        // Something happens in so many runs, once each; eight runs of 20 s may have sixteen events, and a
+        // tenth of 1600 pairs may be spoiled.
         let with = |runs: usize, rows: usize| {
             let by = Pose::new(0.2, -0.1, 0.3);
             let (mut all, carried) = (driven(None), driven(Some(Happens::Carried(by, rows))));

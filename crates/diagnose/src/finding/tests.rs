@@ -1,3 +1,5 @@
+//! Findings on paper: causes, probabilities, doubts.
+
 use super::*;
 
 const SLIP: Cause = Cause::Effect("slip_speed");

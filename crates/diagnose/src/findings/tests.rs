@@ -1,3 +1,5 @@
+//! Stages of the findings, each for itself.
+
 use std::collections::BTreeMap;
 
 use super::*;
@@ -7,7 +9,7 @@ use crate::finding::of_causes;
 use crate::fit_cache::FitCache;
 use crate::residual_tests::{Checked, Outliers};
 use crate::selection::search;
-use crate::tests::{fitted, session};
+use crate::small_robot::{fitted, session};
 
 /// A structure without effects, whose checks have these p-values.
 fn structure<'a>(datasets: &'a [Dataset], checks: &[(Check, f64, bool)]) -> MeanStructure<'a> {
@@ -210,7 +212,8 @@ fn stamps_that_were_set_right_roughly_leave_what_has_no_name() {
         let value = crate::document::Value { value: share, sigma: Some(0.01), unit: "1".to_owned() };
         Finding { parameters: BTreeMap::from([("share".to_owned(), value)]), ..mean("interval_error", 9.0) }
     };
-    let error = |is_undone_roughly| StampError::of_test(crate::tests::effect("interval_error"), is_undone_roughly);
+    let error =
+        |is_undone_roughly| StampError::of_test(crate::small_robot::effect("interval_error"), is_undone_roughly);
     let left = |stamps: Option<&StampError>| {
         let of = StageResults { stamps, ..results(&datasets, &structure) };
         without_remainders_of_stamps(&of, vec![of_stamps(0.9), mean("slip_speed", 9.0), unknown()]).len()

@@ -1,3 +1,5 @@
+//! Causes of large errors: those that made them, and on paper.
+
 use dataset::RunInfo;
 use dataset::{Dataset, Displacement, NominalRobot, Odometry, Provenance, Run, TruthNoise, TruthSample, WheelLog};
 use effects::{Address, Stream, StreamName};
@@ -263,5 +265,5 @@ fn regress_no_number_of_an_attribution_moves() {
         }
         text += &format!("{:?}\n", log_likelihoods(&model, &NAMES, &[ErrorSource::Robot]));
     }
-    crate::tests::assert_unmoved("attribution.txt", &text);
+    crate::small_robot::assert_unmoved("attribution.txt", &text);
 }

@@ -1,3 +1,5 @@
+//! What is said of findings, to the letter.
+
 use super::*;
 use crate::check::Component;
 use crate::document::Compared;

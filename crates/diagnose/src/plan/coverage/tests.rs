@@ -1,3 +1,5 @@
+//! What a plan adds, takes out and says.
+
 use nalgebra::{DMatrix, DVector};
 
 use super::*;
@@ -13,10 +15,10 @@ fn noise_is_that_of_the_instrument_and_of_the_wheels() {
     let of = |scenario: &Scenario| noise(scenario).map(|noise| noise.variance.map(f64::sqrt));
     let is_near =
         |found: [f64; 4], expected: [f64; 4]| found.iter().zip(expected).all(|(found, of)| (found - of).abs() < 1e-9);
-    let captured = scenario(include_str!("../../../../../scenarios/motion-capture.toml"));
+    let captured = scenario(crate::small_robot::MOTION_CAPTURE);
     assert!(is_near(of(&captured).expect("poses"), [5e-4, 1e-6, 3e-4, 5e-4]));
     // Two marks, 0.463 m from each other, read to 0.5 mm on a grid of 1 mm: √(0.25 + 1/12) mm each.
-    let grid = scenario(include_str!("../../../../../scenarios/paper.toml"));
+    let grid = scenario(crate::small_robot::PAPER);
     let mark = (0.25e-6_f64 + 1e-6 / 12.0).sqrt();
     let heading = mark / (2.0 * 0.2315_f64.powi(2)).sqrt();
     let found = of(&grid).expect("poses");
@@ -116,7 +118,10 @@ fn what_stays_hidden_is_said_with_what_would_show_it() {
         not_detectable_among(&["payload_compression"]),
         format!(" Still not detectable: payload_compression ({how}).")
     );
-    assert!(!is_driven(&crate::tests::effect("payload_compression")) && is_driven(&crate::tests::effect("slip_speed")));
+    assert!(
+        !is_driven(&crate::small_robot::effect("payload_compression"))
+            && is_driven(&crate::small_robot::effect("slip_speed"))
+    );
     let smallest = |unit: &str| Smallest { value: 0.0123, unit: unit.to_owned(), parameter: "a".to_owned() };
     assert_eq!(from_size(&smallest("m")), "shows from a = 1.23e-2 m on");
     assert_eq!(from_size(&smallest("1")), "shows from a = 1.23e-2 on");

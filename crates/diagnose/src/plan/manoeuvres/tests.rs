@@ -1,3 +1,5 @@
+//! Manoeuvres, and runs along them, on paper.
+
 use super::*;
 
 pub(in crate::plan) fn setting() -> Setting {
@@ -178,7 +180,7 @@ fn an_instrument_measures_at_its_intervals_and_at_the_end() {
     let at = run_of(&setting, straight, Measurements::At(&[0.5, 1.0]));
     let times: Vec<f64> = at.truth.iter().map(|of| of.t_s).collect();
     assert!((times[1] - 1.8).abs() < 1e-9 && (times[2] - 3.6).abs() < 1e-9, "{times:?}");
-    // Half of the way after half a second and half of what it takes.
+    // Half of the distance after half a second and half of what it takes.
     let half =
         &run_of(&Setting { between_rows_s: 0.01, ..setting }, straight, Measurements::At(&[1.75 / 3.51])).truth[1];
     assert!((half.x_m - 0.25).abs() < 2e-3, "{half:?}");

@@ -1,4 +1,4 @@
-//! What tests of several modules share: sessions of a robot, and numbers that are held to a file.
+//! What tests of several modules share: sessions of a robot, scenarios, and numbers that are held to a file.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -14,9 +14,7 @@ use crate::augmented_model::{AugmentedModel, refit};
 use crate::candidate::Candidate;
 use crate::record_faults::sessions;
 
-mod models;
-
-#[path = "../../../estimation/src/tests/golden_numbers.rs"]
+#[path = "../../estimation/src/tests/golden_numbers.rs"]
 mod golden_numbers;
 
 /// Refuses numbers that are not those of a file of `tests/golden/`, which YAIR_UPDATE_DOCS=1 writes anew.
@@ -25,8 +23,8 @@ pub(crate) fn assert_unmoved(name: &str, text: &str) {
     golden_numbers::assert_unmoved(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(name), text);
 }
 
-/// Seconds of a row.
-const ROW_S: f64 = 0.1;
+pub(crate) const MOTION_CAPTURE: &str = include_str!("../../../scenarios/motion-capture.toml");
+pub(crate) const PAPER: &str = include_str!("../../../scenarios/paper.toml");
 
 /// What each wheel drives in a row of a kind of path, metres: two starts and stops, at 0.3 and at 0.15 m/s.
 fn tread_m(protocol: Protocol, row: u32) -> Wheels<f64> {
@@ -44,6 +42,7 @@ fn tread_m(protocol: Protocol, row: u32) -> Wheels<f64> {
 /// A session of eight runs of 20 s, two of each kind of path, seen twice a second to a millimetre. Both
 /// wheels lose so much of a metre for each metre a second that they drive.
 pub(crate) fn session(number: u32, slip_s_m: f64) -> Dataset {
+    let row_s = 0.1;
     let kinds = [Protocol::Straight, Protocol::Spin, Protocol::SquareCcw, Protocol::SquareCw];
     let run = |run: u32| {
         let protocol = kinds[(run % 4) as usize];
@@ -52,7 +51,7 @@ pub(crate) fn session(number: u32, slip_s_m: f64) -> Dataset {
         for row in 0..=200_u32 {
             if row > 0 {
                 let tread = tread_m(protocol, row - 1);
-                let ground = tread.map(|m| 1.01 * m * (1.0 - slip_s_m * (m / ROW_S).abs()));
+                let ground = tread.map(|m| 1.01 * m * (1.0 - slip_s_m * (m / row_s).abs()));
                 pose = pose * Increment::from_travel(ground, 0.366).arc();
                 angles = angles.zip_with(tread, |mut all: Vec<f64>, m| {
                     all.push(all[all.len() - 1] + m / 0.08);
@@ -66,7 +65,7 @@ pub(crate) fn session(number: u32, slip_s_m: f64) -> Dataset {
                     1e-3 * ((12.9898 * k + 78.233 * axis).sin() * 43_758.545).fract()
                 };
                 truth.push(TruthSample::new(
-                    ROW_S * f64::from(row),
+                    row_s * f64::from(row),
                     pose.x_m + error(1.0),
                     pose.y_m + error(2.0),
                     Some(pose.theta_rad + error(3.0)),
@@ -79,7 +78,7 @@ pub(crate) fn session(number: u32, slip_s_m: f64) -> Dataset {
             _ => ProtocolSettings { side_m: Some(1.0), ..ProtocolSettings::default() },
         };
         let info = RunInfo { id: format!("run-{run}"), protocol: Some(protocol), settings, ..RunInfo::default() };
-        let t_s = (0..=200).map(|row| ROW_S * f64::from(row)).collect();
+        let t_s = (0..=200).map(|row| row_s * f64::from(row)).collect();
         Run {
             info,
             odometry: Odometry { t_s, wheels: WheelLog::Angles(angles), ..Odometry::default() },

@@ -7,7 +7,6 @@ use dataset::{Dataset, TruthSample, WheelLog};
 use estimation::{Model, ModelFit, Noise};
 use kinematics::Wheels;
 
-use super::{assert_unmoved, effect, fitted, session, with_effects};
 use crate::augmented_model::{AugmentedModel, cost, count, left_out_cost};
 use crate::candidate::{Candidate, mean_terms};
 use crate::detectability::detectability;
@@ -27,6 +26,7 @@ use crate::run_to_run::differs_from_run_to_run;
 use crate::scan::scan;
 use crate::selection::{search, search_ungated};
 use crate::settings::levels::SCAN_LEVEL;
+use crate::small_robot::{assert_unmoved, effect, fitted, session, with_effects};
 use crate::sparse_terms::{SparseSearch, lack_of_fit};
 use crate::wald::{cluster_robust_test, deflated_p_value, tests_of};
 
