@@ -15,7 +15,7 @@ use super::draw::{CaseDraws, Draw};
 use super::drive::{DriveContext, HELD_OUT_RUN, OTHER_SESSION, PLANNED, drive, mean_square_motion};
 use super::hidden::{EffectKind, Hidden, hideable};
 use super::instrument::InstrumentModel;
-use super::oracle::{Asked, Detectability, TrueNoise};
+use super::oracle::{Detectability, Hypotheses, TrueNoise};
 use super::power::DISCRIMINATION_LEVEL;
 use super::robot::{RandomRobot, SessionPlan};
 use crate::error::ChallengeError;
@@ -179,15 +179,15 @@ impl Case {
         let noise = TrueNoise::of(&conditions, &instrument_model, mean_square_motion(&plain));
         let (mut detectability, mut rounding_shares) = (Vec::new(), Vec::new());
         for effect in &mut hidden {
-            let measured = |effect: &Hidden, noise: TrueNoise, asked: Asked<'_>| {
+            let measured = |effect: &Hidden, noise: TrueNoise, hypotheses: Hypotheses<'_>| {
                 let exact = drive(&robot.sessions, &measurement, &[effect], false, 0)?;
-                Ok(Detectability::of(&cut_into_runs(exact, &stops), &plain, &truth, noise, asked))
+                Ok(Detectability::of(&cut_into_runs(exact, &stops), &plain, &truth, noise, hypotheses))
             };
-            match scale(effect, &mut draw, ratios, |effect, asked| measured(effect, noise, asked))? {
+            match scale(effect, &mut draw, ratios, |effect, hypotheses| measured(effect, noise, hypotheses))? {
                 Chosen::RecordFault => detectability.push(None),
                 Chosen::Detectability(found) => detectability.push(Some(*found)),
                 Chosen::Undetectable => {
-                    return Ok(match measured(effect, noise.without_rounding(), Asked::One(effect.id)) {
+                    return Ok(match measured(effect, noise.without_rounding(), Hypotheses::One(effect.id)) {
                         Ok(Some(unrounded)) if is_unresolved(effect, &unrounded, noise) => Attempt::Unresolved,
                         _ => Attempt::Undetectable,
                     });
@@ -195,7 +195,7 @@ impl Case {
             }
             rounding_shares.push(match detectability.last() {
                 Some(Some(found)) if noise.has_rounding() => {
-                    measured(effect, noise.without_rounding(), Asked::One(effect.id))?.map(|unrounded| {
+                    measured(effect, noise.without_rounding(), Hypotheses::One(effect.id))?.map(|unrounded| {
                         1.0 - known_noncentrality(effect, found) / known_noncentrality(effect, &unrounded)
                     })
                 }
@@ -205,7 +205,7 @@ impl Case {
         let all: Vec<&Hidden> = hidden.iter().collect();
         let both = if hidden.len() == 2 {
             let exact = drive(&robot.sessions, &measurement, &all, false, 0)?;
-            Detectability::of(&exact, &plain, &truth, noise, Asked::All)
+            Detectability::of(&exact, &plain, &truth, noise, Hypotheses::All)
         } else {
             None
         };
@@ -261,7 +261,7 @@ impl Case {
             all.extend(drive(plans, &measurement, hidden, false, PLANNED)?);
             Ok(all)
         };
-        let Some(detectability) = Detectability::of(&all(&[effect])?, &all(&[])?, &truth, self.noise, Asked::All)
+        let Some(detectability) = Detectability::of(&all(&[effect])?, &all(&[])?, &truth, self.noise, Hypotheses::All)
         else {
             return Ok(None);
         };
@@ -319,13 +319,13 @@ fn scale(
     effect: &mut Hidden,
     draw: &mut Draw,
     (low, high): (f64, f64),
-    measured: impl Fn(&Hidden, Asked<'_>) -> Result<Option<Detectability>, ChallengeError>,
+    measured: impl Fn(&Hidden, Hypotheses<'_>) -> Result<Option<Detectability>, ChallengeError>,
 ) -> Result<Chosen, ChallengeError> {
     if effect.kind == EffectKind::RecordFault {
         return Ok(Chosen::RecordFault);
     }
     effect.scale = effect.most.min(1.0);
-    let of_size = |effect: &Hidden| measured(effect, Asked::One(effect.id));
+    let of_size = |effect: &Hidden| measured(effect, Hypotheses::One(effect.id));
     let Some(first) = of_size(effect)? else { return Ok(Chosen::Undetectable) };
     let at_first = size_ratio(effect, &first);
     // The largest that a real robot may have must reach the limit, or the paths do not show the effect.
@@ -361,7 +361,7 @@ fn scale(
     if !close {
         return Ok(Chosen::Undetectable);
     }
-    let Some(found) = measured(effect, Asked::All)? else { return Ok(Chosen::Undetectable) };
+    let Some(found) = measured(effect, Hypotheses::All)? else { return Ok(Chosen::Undetectable) };
     // A form that another name's hypothesis describes better is, to whoever has these hypotheses, that other
     // effect.
     let described_better = || {
@@ -430,7 +430,7 @@ impl Trial {
             let mut noncentrality = 0.0;
             for _ in 0..4 {
                 let exact = drive(&robot.sessions, &measurement, &[&hidden], false, 0)?;
-                let Some(detectability) = Detectability::of(&exact, &plain, &truth, noise, Asked::All) else {
+                let Some(detectability) = Detectability::of(&exact, &plain, &truth, noise, Hypotheses::All) else {
                     return Ok(None);
                 };
                 noncentrality = detectability.noncentrality_in_form(hidden.id);
@@ -461,7 +461,7 @@ impl Trial {
         let measurement = DriveContext { seed: *seed, number, conditions, robot, instrument_model, instrument: None };
         let all = [&self.hidden];
         let data = drive(&robot.sessions, &measurement, if hidden { &all } else { &[] }, true, 0)?;
-        let detectability = Detectability::of(&data, &self.plain, &self.truth, self.noise, Asked::All);
+        let detectability = Detectability::of(&data, &self.plain, &self.truth, self.noise, Hypotheses::All);
         Ok(detectability.map_or(0.0, |detectability| detectability.statistic(self.hidden.id)))
     }
 }

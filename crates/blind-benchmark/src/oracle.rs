@@ -39,9 +39,9 @@ struct Candidate {
     columns: std::ops::Range<usize>,
 }
 
-/// Which names noise-free runs are asked for.
+/// Which effects' hypotheses noise-free runs are fitted by.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Asked<'n> {
+pub(crate) enum Hypotheses<'n> {
     /// All of the catalogue: to see which of them are told from each other.
     All,
     /// One: to see how large its effect is.
@@ -255,16 +255,16 @@ impl Detectability {
         without: &[Dataset],
         truth: &DriveGeometry,
         noise: TrueNoise,
-        asked: Asked<'_>,
+        hypotheses: Hypotheses<'_>,
     ) -> Option<Self> {
         let mut terms: Vec<Box<dyn ModelTerm>> = Vec::new();
         let mut candidates = Vec::new();
         let mut at = Column::BASE.len();
-        let is_asked = |id: &str| match asked {
-            Asked::All => true,
-            Asked::One(one) => one == id,
+        let is_among = |id: &str| match hypotheses {
+            Hypotheses::All => true,
+            Hypotheses::One(one) => one == id,
         };
-        for id in CATALOGUE.iter().filter(|id| is_asked(id)) {
+        for id in CATALOGUE.iter().filter(|id| is_among(id)) {
             let Some(variants) = hypothesis(id).and_then(Hypothesis::into_variants) else { continue };
             for variant in variants {
                 let parameters = variant.term.parameters().to_vec();

@@ -455,8 +455,8 @@ mod tests {
         let found = fault(&swapped, Some(&base), &[], false).expect("they are swapped");
         assert_eq!(found.id, "swapped_wheels");
         let fit = fitted(&found.records);
-        // The gain is that of the fit to the records without it, which ends where a step gains less than 0.01:
-        // what further steps would have gained is a few times that.
+        // The gain is that of the fit to the records without it. It ends where a step gains less than 0.01;
+        // further steps would have gained a few times that.
         let most = count(&base).max(count(&fit));
         let gain = cost(&base, most) + implausible(&base) - cost(&fit, most) - implausible(&fit);
         assert!((found.gain - gain).abs() < 0.05, "{} {gain}", found.gain);

@@ -5,6 +5,8 @@
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Normal, StudentsT};
 use statrs::function::erf::erfc_inv;
 
+use crate::settings::levels::MAX_STUDENT_FREEDOM;
+
 /// p-value of a sum of `dimensions` squared normal variables over their variance, when the variance was
 /// estimated from about `freedom` values.
 pub(crate) fn p_of_statistic(statistic: f64, dimensions: usize, freedom: f64) -> f64 {
@@ -65,12 +67,10 @@ pub(crate) fn z_of_p(p: f64) -> f64 {
     std::f64::consts::SQRT_2 * erfc_inv(p.clamp(1e-300, 1.0))
 }
 
-/// Freedom from which on Student's quantile is the normal one to 2e-5, and beyond which statrs finds it worse.
-const MANY: f64 = 1e5;
-
 /// Student's quantile for a two-sided interval of 95 %.
 pub(crate) fn student_95(freedom: f64) -> f64 {
-    StudentsT::new(0.0, 1.0, freedom.clamp(1.0, MANY)).map_or(f64::INFINITY, |student| student.inverse_cdf(0.975))
+    StudentsT::new(0.0, 1.0, freedom.clamp(1.0, MAX_STUDENT_FREEDOM))
+        .map_or(f64::INFINITY, |student| student.inverse_cdf(0.975))
 }
 
 /// Probability that the best of so many trials is as good as `p`; Šidák 1967.

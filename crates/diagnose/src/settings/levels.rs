@@ -51,6 +51,11 @@ pub(crate) const LOW_SIGNIFICANCE_SIGMAS: f64 = 4.5;
 /// Derived: Φ⁻¹(0.975).
 pub(crate) const NORMAL_QUANTILE_95: f64 = 1.96;
 
+/// Number. Degrees of freedom that Student's quantile is asked for at the most: with more it is the normal
+/// one to 2e-5.
+/// Budgeted: from 10⁶ on the library's search for it errs by more.
+pub(crate) const MAX_STUDENT_FREEDOM: f64 = 1e5;
+
 /// Standard deviations. One-sided 95 % quantile of a normal variable.
 /// Derived: Φ⁻¹(0.95).
 pub(crate) const NORMAL_QUANTILE_ONE_SIDED_95: f64 = 1.645;
