@@ -155,9 +155,9 @@ def switched(text, mutants):
             unplaced += [number for number, _ in own]
             continue
         head, body = text[start:body_at], text[body_at:end]
-        # Arms have one type: an iterator of a type that is not named becomes a boxed one.
+        # Arms have one type: an iterator or a closure of a type that is not named becomes a boxed one.
         before = behind = ""
-        if hidden := re.search(r"->\s*impl (Iterator<Item = .*>)( \+ '\w+)?\s*$", head):
+        if hidden := re.search(r"->\s*impl (Iterator<Item = .*>|Fn\w*\(.*\)(?: -> [^+]*?)?)( \+ '\w+)?\s*$", head):
             borrowed = " + '_" if "&" in head[: hidden.start()] else ""
             boxed = f"Box<dyn {hidden[1]}{hidden[2] or borrowed}>"
             head = f"{head[: hidden.start()]}-> {boxed} "
