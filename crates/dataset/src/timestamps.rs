@@ -14,7 +14,7 @@ pub struct Timestamps {
 }
 
 impl Timestamps {
-    /// [`SamplingPeriod::of`] them.
+    /// The beat behind them; `None` where rows are too few to have one.
     pub fn sampling_period(&self) -> Option<&SamplingPeriod> {
         self.period.get_or_init(|| SamplingPeriod::of(&self.t_s).map(Arc::new)).as_deref()
     }
