@@ -9,6 +9,11 @@ use scenario::Scenario;
 
 use crate::motion_capture;
 
+/// An effect as a scenario has it.
+fn effect(id: &str, sizes: &str) -> String {
+    format!("[[effect]]\nkind = \"{id}\"\n{sizes}\n")
+}
+
 /// The shipped scenario with calibration errors, a few short runs and one more effect.
 pub(crate) fn simulated(effect: &str, seed: u64) -> Dataset {
     let protocols = [
@@ -57,15 +62,15 @@ pub(crate) fn other_logs() -> Vec<(&'static str, Dataset)> {
         std::mem::swap(&mut before[other - 1].truth, &mut behind[0].truth);
     }
     vec![
-        ("coarse", simulated("[[effect]]\nkind = \"quantization\"\ncounts_per_tick = 80\n", 5)),
-        ("kicks", simulated("[[effect]]\nkind = \"castor_kick\"\nkick_rad = 0.02\ndecay_m = 0.15\n", 5)),
-        ("swapped", simulated("[[effect]]\nkind = \"swapped_wheels\"\nswapped = true\n", 5)),
+        ("coarse", simulated(&effect("quantization", "counts_per_tick = 80"), 5)),
+        ("kicks", simulated(&effect("castor_kick", "kick_rad = 0.02\ndecay_m = 0.15"), 5)),
+        ("swapped", simulated(&effect("swapped_wheels", "swapped = true"), 5)),
         ("larger wheels", described(1.18, 1.0)),
         ("skid steered", described(1.0, 1.4)),
         ("late run", late),
         ("moved run", lifted),
         ("received", received),
-        ("bumps", simulated("[[effect]]\nkind = \"bumps\"\nper_m = 0.5\nheight_m = 0.006\n", 5)),
+        ("bumps", simulated(&effect("bumps", "per_m = 0.5\nheight_m = 0.006"), 5)),
         ("exchanged runs", exchanged),
     ]
 }
@@ -73,47 +78,41 @@ pub(crate) fn other_logs() -> Vec<(&'static str, Dataset)> {
 /// Further logs, of other instruments, clocks and faults, each of one session or several.
 pub(crate) fn further_logs() -> Vec<(&'static str, Vec<Dataset>)> {
     let sound = simulated("", 5);
-    let effect = |id: &str, sizes: &str| simulated(&format!("[[effect]]\nkind = \"{id}\"\n{sizes}\n"), 5);
-    let slips = "[[effect]]\nkind = \"slip_speed\"\nslip_s_m = 0.05\n";
+    let with = |id: &str, sizes: &str| simulated(&effect(id, sizes), 5);
+    let slips = effect("slip_speed", "slip_s_m = 0.05");
     // The third session does not have what the others have.
-    let sessions = vec![simulated(slips, 6), simulated(slips, 7), simulated("", 8)];
-    let mut at_ends = effect("truth_yaw", "yaw_rad = 0.02");
+    let sessions = vec![simulated(&slips, 6), simulated(&slips, 7), simulated("", 8)];
+    let mut at_ends = with("truth_yaw", "yaw_rad = 0.02");
     at_ends.runs.iter_mut().for_each(|run| drop(run.truth.drain(1..run.truth.len() - 1)));
-    let mut clock = effect("truth_latency", "delay_s = 0.03");
+    let mut clock = with("truth_latency", "delay_s = 0.03");
     clock.runs.iter_mut().flat_map(|run| &mut run.truth).for_each(|sample| sample.t_s += 0.3);
     vec![
         ("sessions", sessions),
         ("ends", vec![at_ends]),
-        (
-            "coarse slip",
-            vec![simulated(
-                "[[effect]]\nkind = \"quantization\"\ncounts_per_tick = 80\n\n[[effect]]\nkind = \"slip_speed\"\nslip_s_m = 0.05\n",
-                5,
-            )],
-        ),
+        ("coarse slip", vec![simulated(&(effect("quantization", "counts_per_tick = 80") + &slips), 5)]),
         ("clock", vec![clock]),
         (
             "displacements",
-            vec![displacements(&effect(
+            vec![displacements(&with(
                 "truth_correlated_noise",
                 "sigma_xy_m = 0.001\nsigma_theta_rad = 0.001\ntau_s = 0.5",
             ))],
         ),
         ("carried", vec![carried(&sound)]),
         ("other mounting", vec![mounted_otherwise(&sound)]),
-        ("reset", vec![effect("counter_reset", "probability = 0.005\npersistent = true")]),
-        ("torn", vec![effect("torn_read", "probability = 0.003\njump_counts = 65536")]),
+        ("reset", vec![with("counter_reset", "probability = 0.005\npersistent = true")]),
+        ("torn", vec![with("torn_read", "probability = 0.003\njump_counts = 65536")]),
         (
             "turned",
             vec![simulated(
-                "[[effect]]\nkind = \"reversed_wheel\"\nleft = true\n\n[[effect]]\nkind = \"dropped_samples\"\nprobability = 0.01\n",
+                &(effect("reversed_wheel", "left = true") + &effect("dropped_samples", "probability = 0.01")),
                 5,
             )],
         ),
-        ("other counts", vec![effect("wrong_counts_per_turn", "factor = 2.0")]),
-        ("twist", vec![twist(&effect("slip_speed", "slip_s_m = 0.03"))]),
-        ("payload", vec![effect("payload_compression", "common_per_kg = 0.002\npayload_kg = [0.0, 2.0, 5.0]")]),
-        ("positions", vec![positions(&effect("truth_lever_arm", "lever_x_m = 0.02\nlever_y_m = 0.01"))]),
+        ("other counts", vec![with("wrong_counts_per_turn", "factor = 2.0")]),
+        ("twist", vec![twist(&with("slip_speed", "slip_s_m = 0.03"))]),
+        ("payload", vec![with("payload_compression", "common_per_kg = 0.002\npayload_kg = [0.0, 2.0, 5.0]")]),
+        ("positions", vec![positions(&with("truth_lever_arm", "lever_x_m = 0.02\nlever_y_m = 0.01"))]),
         ("map", vec![in_a_map()]),
         ("marks", vec![of_marks()]),
     ]
@@ -191,7 +190,7 @@ fn twist(dataset: &Dataset) -> Dataset {
 /// Poses in a map whose distortion is stated, of a robot that slips.
 fn in_a_map() -> Dataset {
     let mut scenario = Scenario::parse(include_str!("../../scenarios/slam.toml"), "slam.toml").expect("shipped");
-    let of_robot = motion_capture::robot("[[effect]]\nkind = \"slip_speed\"\nslip_s_m = 0.1\n", &[]);
+    let of_robot = motion_capture::robot(&effect("slip_speed", "slip_s_m = 0.1"), &[]);
     scenario.effects.extend(of_robot.effects.into_iter().filter(|effect| effect.id() == "slip_speed"));
     scenario.protocols = vec![
         Schedule::Squares { side_m: 1.0, runs_each_way: 2 },

@@ -28,11 +28,8 @@ const SEED: u64 = 31_031;
 const CASES: [u64; 11] = [58, 55, 67, 23, 11, 31, 14, 12, 10, 1, 56];
 
 fn file_of(name: &str) -> PathBuf {
-    file(&format!("{}.txt", name.replace(' ', "_")))
-}
-
-fn file(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/diagnosis_numbers/golden").join(name)
+    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/diagnosis_numbers/golden");
+    golden.join(format!("{}.txt", name.replace(' ', "_")))
 }
 
 /// All that a diagnosis says, each line behind the name of what it is of.
@@ -88,12 +85,12 @@ fn regress_no_number_of_a_diagnosis_moves() {
     for case in CASES {
         let datasets = challenge_datasets(Scope::Whole, SEED, case).expect("simulates");
         golden_numbers::assert_unmoved(
-            &file(&format!("case_{case}.txt")),
+            &file_of(&format!("case {case}")),
             &written(&case.to_string(), &datasets, &Options::default()),
         );
     }
     let cancelling = challenge_datasets(Scope::Whole, CANCELLING.0, CANCELLING.1).expect("simulates");
-    golden_numbers::assert_unmoved(&file("cancelling.txt"), &written("cancelling", &cancelling, &Options::default()));
+    golden_numbers::assert_unmoved(&file_of("cancelling"), &written("cancelling", &cancelling, &Options::default()));
     for (name, dataset) in other_logs() {
         golden_numbers::assert_unmoved(&file_of(name), &written(name, &[dataset], &Options::default()));
     }
@@ -126,7 +123,7 @@ fn regress_no_number_of_a_nested_gain_moves() {
     let turn_rate = "[[effect]]\nkind = \"turn_rate_wheelbase\"\nbeta_s = 0.05\n";
     let sessions = [simulated(turn_rate, 6), simulated(turn_rate, 7)];
     let gains = nested_gains(&sessions, &Options::default()).expect("diagnoses");
-    golden_numbers::assert_unmoved(&file("nested.txt"), &format!("{gains:#?}"));
+    golden_numbers::assert_unmoved(&file_of("nested"), &format!("{gains:#?}"));
 }
 
 #[test]
@@ -136,6 +133,6 @@ fn regress_no_number_of_a_plan_moves() {
         let scenario = Scenario::parse(text, name).expect("a shipped scenario");
         let limits = Limits { room_m: Some([5.0, 4.0]), minutes: Some(10.0), ..Limits::default() };
         let plan = plan_scenario(&scenario, &limits).expect("a plan");
-        golden_numbers::assert_unmoved(&file(&format!("plan_{name}.txt")), &format!("{plan:#?}"));
+        golden_numbers::assert_unmoved(&file_of(&format!("plan {name}")), &format!("{plan:#?}"));
     }
 }

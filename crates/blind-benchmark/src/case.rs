@@ -430,7 +430,8 @@ impl Trial {
             let mut noncentrality = 0.0;
             for _ in 0..4 {
                 let exact = drive(&robot.sessions, &measurement, &[&hidden], false, 0)?;
-                let Some(detectability) = Detectability::of(&exact, &plain, &truth, noise, Hypotheses::All) else {
+                let own = Hypotheses::One(hidden.id);
+                let Some(detectability) = Detectability::of(&exact, &plain, &truth, noise, own) else {
                     return Ok(None);
                 };
                 noncentrality = detectability.noncentrality_in_form(hidden.id);
@@ -461,7 +462,8 @@ impl Trial {
         let measurement = DriveContext { seed: *seed, number, conditions, robot, instrument_model, instrument: None };
         let all = [&self.hidden];
         let data = drive(&robot.sessions, &measurement, if hidden { &all } else { &[] }, true, 0)?;
-        let detectability = Detectability::of(&data, &self.plain, &self.truth, self.noise, Hypotheses::All);
+        let own = Hypotheses::One(self.hidden.id);
+        let detectability = Detectability::of(&data, &self.plain, &self.truth, self.noise, own);
         Ok(detectability.map_or(0.0, |detectability| detectability.statistic(self.hidden.id)))
     }
 }

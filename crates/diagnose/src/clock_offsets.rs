@@ -234,11 +234,12 @@ pub(crate) fn turns_at(rows_s: &[f64], turns: &Wheels<Vec<f64>>, t_s: f64) -> Wh
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use dataset::{NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, WheelLog};
+    use dataset::{Odometry, Run, RunInfo, TruthSample, WheelLog};
     use kinematics::{Increment, Pose};
 
     use super::*;
     use crate::settings::records::MIN_COMMON_CLOCK_OFFSET_S;
+    use crate::small_robot::{assert_unmoved, dataset_of};
 
     fn offsets(datasets: &[Dataset]) -> Clocks {
         clock_offsets(datasets, MIN_COMMON_CLOCK_OFFSET_S)
@@ -275,19 +276,7 @@ pub(crate) mod tests {
                 ..Run::default()
             }
         };
-        Dataset {
-            provenance: Provenance::default(),
-            robot: NominalRobot {
-                left_wheel_diameter_m: 0.16,
-                right_wheel_diameter_m: 0.16,
-                wheel_separation_m: 0.36,
-                ticks_per_rev: None,
-                counter_bits: None,
-            },
-            truth_noise: TruthNoise::default(),
-            points: Vec::new(),
-            runs: offsets_s.iter().enumerate().map(run).collect(),
-        }
+        dataset_of(0.36, offsets_s.iter().enumerate().map(run).collect())
     }
 
     #[test]
@@ -441,7 +430,7 @@ pub(crate) mod tests {
             let of = Profile::of(run, &dataset, &geometry).expect("it drives");
             text += &format!("{:?} {} {}\n", of.costs, of.offset_s, of.sigma_s);
         }
-        crate::small_robot::assert_unmoved("clocks.txt", &text);
+        assert_unmoved("clocks.txt", &text);
     }
 
     #[test]

@@ -280,7 +280,7 @@ mod tests {
         let [left, right] = ["left_wheel_diameter_m", "right_wheel_diameter_m"].map(|key| values[key]);
         assert!((right / left - 0.998).abs() < 1e-9 && (left + right - 0.3232).abs() < 1e-3, "{values:?}");
         assert!(!of.changes_records() && of.remarks.is_empty());
-        let robot = crate::small_robot::session(0, 0.0).robot;
+        let robot = crate::small_robot::robot(0.363);
         assert!(of.check(&robot).is_ok());
         let other = NominalRobot { wheel_separation_m: 9.0, ..robot };
         assert!(matches!(of.check(&other), Err(ExtendedModelError::OtherRobot(_))));

@@ -285,7 +285,10 @@ fn batched(datasets: &[Dataset], corrections: fn(&Dataset) -> Vec<RecordCorrecti
 
 #[cfg(test)]
 mod tests {
+    use estimation::Noise;
+
     use super::*;
+    use crate::small_robot::{fitted, session};
 
     #[test]
     fn faults_that_undo_as_much_are_rivals_each_once_and_the_likeliest_first() {
@@ -310,14 +313,10 @@ mod tests {
         assert_eq!(rivals(&tried, true, &best), []);
     }
 
-    use estimation::Noise;
-
-    use crate::small_robot::{fitted, session};
-
     /// A fit without measurements: wheels and separation over nominal, the instrument's heading, and standard
     /// deviations of the noise.
     fn fit<'a>([left, right, separation]: [f64; 3], theta_rad: f64, sigmas: [f64; 4]) -> ModelFit<'a> {
-        let of = estimation::Model::of(&session(0, 0.0).robot.geometry().expect("a drive"), 0);
+        let of = estimation::Model::of(&crate::small_robot::robot(0.363).geometry().expect("a drive"), 0);
         let noise = Noise { variance: sigmas.map(|sigma| sigma * sigma), timing_s2: 0.0 };
         let mut fit = ModelFit::from_parameters(of, noise, &[]);
         let model = &mut fit.solution.model;

@@ -294,13 +294,14 @@ pub(crate) fn residual_persistence(model: &AugmentedModel<'_>, component: usize)
 
 #[cfg(test)]
 mod tests {
-    use dataset::{Dataset, Displacement, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, WheelLog};
+    use dataset::{Dataset, Displacement, Odometry, Run, RunInfo, WheelLog};
     use estimation::{FitSettings, ModelFit};
     use kinematics::{Increment, Pose, Wheels};
 
     use super::{anscombe_glynn, outliers, residual_persistence, whiteness};
     use crate::augmented_model::AugmentedModel;
     use crate::check::ResidualPersistence;
+    use crate::small_robot::dataset_of;
     use crate::{Options, Verdict, diagnose};
 
     /// Poses of six runs of forty seconds, turning both ways and back and forth, by the nominal robot.
@@ -325,15 +326,7 @@ mod tests {
             Run { info, odometry, ..Run::default() }
         };
         let runs = (0..6).map(run).collect();
-        let robot = NominalRobot {
-            left_wheel_diameter_m: 0.16,
-            right_wheel_diameter_m: 0.16,
-            wheel_separation_m: 0.363,
-            ticks_per_rev: None,
-            counter_bits: None,
-        };
-        let (provenance, truth_noise, points) = (Provenance::default(), TruthNoise::default(), Vec::new());
-        (Dataset { provenance, robot, truth_noise, points, runs }, poses)
+        (dataset_of(0.363, runs), poses)
     }
 
     /// Errors as good as normal ones: millimetres and milliradians, the sum of twelve uniform ones by

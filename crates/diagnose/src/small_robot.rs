@@ -26,6 +26,28 @@ pub(crate) fn assert_unmoved(name: &str, text: &str) {
 pub(crate) const MOTION_CAPTURE: &str = include_str!("../../../scenarios/motion-capture.toml");
 pub(crate) const PAPER: &str = include_str!("../../../scenarios/paper.toml");
 
+/// A robot whose angles are logged, with wheels of 160 mm so far apart.
+pub(crate) const fn robot(wheel_separation_m: f64) -> NominalRobot {
+    NominalRobot {
+        left_wheel_diameter_m: 0.16,
+        right_wheel_diameter_m: 0.16,
+        wheel_separation_m,
+        ticks_per_rev: None,
+        counter_bits: None,
+    }
+}
+
+/// Its runs, of which nothing else is known.
+pub(crate) fn dataset_of(wheel_separation_m: f64, runs: Vec<Run>) -> Dataset {
+    Dataset {
+        provenance: Provenance::default(),
+        robot: robot(wheel_separation_m),
+        truth_noise: TruthNoise::default(),
+        points: Vec::new(),
+        runs,
+    }
+}
+
 /// What each wheel drives in a row of a kind of path, metres: two starts and stops, at 0.3 and at 0.15 m/s.
 fn tread_m(protocol: Protocol, row: u32) -> Wheels<f64> {
     let (half, at) = (row / 100, row % 100);
@@ -86,19 +108,8 @@ pub(crate) fn session(number: u32, slip_s_m: f64) -> Dataset {
             ..Run::default()
         }
     };
-    Dataset {
-        provenance: Provenance { name: Some(format!("day {number}")), ..Provenance::default() },
-        robot: NominalRobot {
-            left_wheel_diameter_m: 0.16,
-            right_wheel_diameter_m: 0.16,
-            wheel_separation_m: 0.363,
-            ticks_per_rev: None,
-            counter_bits: None,
-        },
-        truth_noise: TruthNoise::default(),
-        points: Vec::new(),
-        runs: (0..8).map(run).collect(),
-    }
+    let provenance = Provenance { name: Some(format!("day {number}")), ..Provenance::default() };
+    Dataset { provenance, ..dataset_of(0.363, (0..8).map(run).collect()) }
 }
 
 pub(crate) fn fitted(datasets: &[Dataset]) -> ModelFit<'_> {

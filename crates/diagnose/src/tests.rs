@@ -1,5 +1,4 @@
-//! What functions of fits say of three robots, against what they said before: `models.txt` of
-//! `tests/golden/`.
+//! What functions of fits say of a few robots, against what they said before: the files of `tests/golden/`.
 
 use std::fmt::Write;
 

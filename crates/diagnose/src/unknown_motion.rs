@@ -92,10 +92,11 @@ pub(crate) fn unknown_motions(datasets: &[Dataset], late_s: f64, tick_s: f64) ->
 
 #[cfg(test)]
 mod tests {
-    use dataset::{NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, WheelLog};
+    use dataset::{Odometry, Run, RunInfo, TruthSample, WheelLog};
     use kinematics::{Increment, Wheels};
 
     use super::*;
+    use crate::small_robot::{assert_unmoved, dataset_of};
 
     const SEPARATION_M: f64 = 0.36;
 
@@ -167,19 +168,7 @@ mod tests {
                 ..Run::default()
             }
         };
-        Dataset {
-            provenance: Provenance::default(),
-            robot: NominalRobot {
-                left_wheel_diameter_m: 0.16,
-                right_wheel_diameter_m: 0.16,
-                wheel_separation_m: SEPARATION_M,
-                ticks_per_rev: None,
-                counter_bits: None,
-            },
-            truth_noise: TruthNoise::default(),
-            points: Vec::new(),
-            runs: (0..8).map(run).collect(),
-        }
+        dataset_of(SEPARATION_M, (0..8).map(run).collect())
     }
 
     fn found(happens: Happens) -> UnknownMotions {
@@ -283,7 +272,7 @@ mod tests {
             text += &format!("{:?}\n", &calibrated.poses(track)[190..192]);
         }
         assert!(calibrated.extrinsics(0, |(from, _)| from < 4).is_none(), "too few windows");
-        crate::small_robot::assert_unmoved("windows.txt", &text);
+        assert_unmoved("windows.txt", &text);
     }
 
     #[test]

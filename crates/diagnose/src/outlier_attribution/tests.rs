@@ -1,13 +1,13 @@
 //! Causes of large errors: those that made them, and on paper.
 
-use dataset::RunInfo;
-use dataset::{Dataset, Displacement, NominalRobot, Odometry, Provenance, Run, TruthNoise, TruthSample, WheelLog};
+use dataset::{Dataset, Displacement, Odometry, Run, RunInfo, TruthSample, WheelLog};
 use effects::{Address, Stream, StreamName};
 use estimation::FitSettings;
 use kinematics::{Increment, Pose, Wheels};
 
 use super::*;
 use crate::augmented_model::AugmentedModel;
+use crate::small_robot::{assert_unmoved, dataset_of};
 
 const ROW_S: f64 = 0.1;
 const ROWS_PER_MEASUREMENT: u32 = 10;
@@ -93,15 +93,7 @@ pub(crate) fn driven(cause: &str, mahalanobis_distance: bool) -> Dataset {
         let odometry = Odometry { t_s, wheels: WheelLog::Angles(angles), ..Odometry::default() };
         runs.push(Run { info, odometry, truth, displacements, ..Run::default() });
     }
-    let robot = NominalRobot {
-        left_wheel_diameter_m: 0.16,
-        right_wheel_diameter_m: 0.16,
-        wheel_separation_m: SEPARATION_M,
-        ticks_per_rev: None,
-        counter_bits: None,
-    };
-    let (provenance, truth_noise, points) = (Provenance::default(), TruthNoise::default(), Vec::new());
-    Dataset { provenance, robot, truth_noise, points, runs }
+    dataset_of(SEPARATION_M, runs)
 }
 
 /// Causes with their log likelihoods, the likeliest first, and that of any cause.
@@ -265,5 +257,5 @@ fn regress_no_number_of_an_attribution_moves() {
         }
         text += &format!("{:?}\n", log_likelihoods(&model, &NAMES, &[ErrorSource::Robot]));
     }
-    crate::small_robot::assert_unmoved("attribution.txt", &text);
+    assert_unmoved("attribution.txt", &text);
 }

@@ -4,13 +4,7 @@ use super::*;
 
 pub(in crate::plan) fn setting() -> Setting {
     Setting {
-        robot: dataset::NominalRobot {
-            left_wheel_diameter_m: 0.16,
-            right_wheel_diameter_m: 0.16,
-            wheel_separation_m: 0.36,
-            ticks_per_rev: None,
-            counter_bits: None,
-        },
+        robot: crate::small_robot::robot(0.36),
         top_speed_m_s: 0.25,
         acceleration_m_s2: 0.5,
         between_rows_s: 0.05,
