@@ -228,6 +228,13 @@ fn regress_a_fit_that_determines_nothing_in_a_distorted_map_ends_no_process() {
     mended("diagnosis", &[40_000_027, 40_000_145]);
 }
 
+/// Places of a map that are further apart than the whole numbers of 64 bits were subtracted as whole numbers.
+#[test]
+fn regress_places_of_a_map_may_be_any_doubles_apart() {
+    mended("calibrators", &[800_000_781, 800_001_754]);
+    mended("diagnosis", &[800_002_684]);
+}
+
 /// An axis of logarithms over the smallest doubles began at zero, and its ticks at the power i32::MIN.
 #[test]
 fn regress_a_figure_of_the_smallest_doubles_has_ticks() {

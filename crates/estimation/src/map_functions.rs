@@ -74,7 +74,7 @@ fn factor(places: impl Iterator<Item = [f64; 2]>, length_m: f64) -> Option<Facto
     }
     let cells: Vec<[i64; 2]> = cells.into_iter().collect();
     let covariance = |a: [i64; 2], b: [i64; 2]| {
-        let squared_m2: f64 = (0..2).map(|k| ((a[k] - b[k]) as f64 * cell_m).powi(2)).sum();
+        let squared_m2: f64 = (0..2).map(|k| ((a[k] as f64 - b[k] as f64) * cell_m).powi(2)).sum();
         (-0.5 * squared_m2 / (length_m * length_m)).exp()
     };
     let (mut left, mut factor) = (vec![1.0_f64; cells.len()], vec![Vec::new(); cells.len()]);
@@ -183,6 +183,14 @@ mod tests {
             assert!((covariance(&functions, a, a) - 1.0).abs() < 1e-12);
             assert!((covariance(&functions, b, b) - 1.0).abs() < 1e-12);
         }
+    }
+
+    #[test]
+    fn places_further_apart_than_whole_numbers_are_independent() {
+        let functions = map_functions([[-1e300, 0.0], [1e300, 0.0]].into_iter(), 0.8);
+        assert_eq!(functions.len(), 2);
+        assert_eq!(covariance(&functions, [-1e300, 0.0], [1e300, 0.0]), 0.0);
+        assert_eq!(covariance(&functions, [1e300, 0.0], [1e300, 0.0]), 1.0);
     }
 
     #[test]
