@@ -6,13 +6,17 @@
 //! the filter takes to be independent ([`crate::rounding`]). Where these matter beside the instrument's own,
 //! one pose is taken for each row, the nearest to it: least is interpolated there. Where the wheels stand,
 //! nothing is, and all count.
+//!
+//! What nobody recorded goes on from row to row while the robot speeds up, so that poses of successive rows
+//! are off alike as well. Of a run that has enough poses near its rows, those that are off by more of it than
+//! the instrument is are left out.
 
 use kinematics::{Increment, Wheels};
 
 use crate::model::Model;
 use crate::rounding::PoseVariance;
 use crate::segment::{MeasuredPose, Segment};
-use crate::settings::MAX_SHARED_VARIANCE_RATIO;
+use crate::settings::{MAX_INTERPOLATED_VARIANCE_RATIO, MAX_SHARED_VARIANCE_RATIO, MIN_POSES_NEAR_ROWS};
 use crate::wheel_angles::WheelInterval;
 
 /// Leaves out poses that share their errors with one that is nearer to the same row. `rows_s` are the
@@ -48,6 +52,29 @@ pub(crate) fn take_one_for_each_row(segment: &mut Segment<'_>, rows_s: &[f64], n
     segment.measurements = taken.into_iter().map(|(_, measured)| measured).collect();
 }
 
+/// Leaves out poses whose wheels' turns between rows are known less well than the instrument measures, but
+/// for the first two and the last, where enough others stay.
+pub(crate) fn take_those_near_rows(segment: &mut Segment<'_>, nominal: &Model, reference: [f64; 2]) {
+    let Segment { measurements, intervals, .. } = segment;
+    let is_near = |measured: &MeasuredPose| {
+        let Some(last) = measured.after.checked_sub(1) else { return true };
+        let interpolated = PoseVariance::of(intervals[last].interpolated_rad2[1], nominal);
+        let is_within = |interpolated: f64, sigma: f64, factor: f64| {
+            interpolated <= MAX_INTERPOLATED_VARIANCE_RATIO * sigma * sigma * factor
+        };
+        let ([position, heading], [of_position, of_heading]) = (reference, measured.variance_factor);
+        is_within(interpolated.along_m2, position, of_position)
+            && (measured.theta_rad.is_none() || is_within(interpolated.heading_rad2, heading, of_heading))
+    };
+    let last = measurements.len().saturating_sub(1);
+    let numbered = measurements.iter().enumerate();
+    let near: Vec<MeasuredPose> =
+        numbered.filter(|(k, measured)| *k < 2 || *k == last || is_near(measured)).map(|(_, of)| *of).collect();
+    if near.len() >= MIN_POSES_NEAR_ROWS {
+        *measurements = near;
+    }
+}
+
 /// What a pose at the end of an interval shares with others of its row.
 fn variance(interval: &WheelInterval, quantum_rad: Wheels<f64>, nominal: &Model) -> PoseVariance {
     let rounded_rad2 = if interval.stands || interval.rate_rad_s == Wheels::both(0.0) {
@@ -75,10 +102,17 @@ mod tests {
     use crate::records::Records;
     use dataset::{Dataset, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, WheelLog};
 
-    /// Three seconds in rows of 0.1 s, by ticks of a wheel of 0.1 m, with poses at 3/8 and 7/8 of each row:
+    /// Three seconds in rows of 0.1 s, by ticks of a wheel of 0.1 m, with poses at two shares of each row:
     /// 0.2 m/s until an instant, and rest.
-    fn dataset(until_s: f64, [ticks_per_rev, sigma_m, jitter_s]: [f64; 3]) -> Dataset {
-        let driven_m = |t_s: f64| 0.2 * f64::min(t_s, until_s);
+    fn dataset(until_s: f64, of: [f64; 3]) -> Dataset {
+        dataset_along(|t_s| 0.2 * f64::min(t_s, until_s), of, [0.375, 0.875])
+    }
+
+    fn dataset_along(
+        driven_m: impl Fn(f64) -> f64,
+        [ticks_per_rev, sigma_m, jitter_s]: [f64; 3],
+        shares: [f64; 2],
+    ) -> Dataset {
         let counted = |row: i32| {
             let turns = driven_m(0.1 * f64::from(row)) / (0.1 * std::f64::consts::PI);
             (turns * ticks_per_rev).floor() as i64
@@ -86,7 +120,7 @@ mod tests {
         let ticks: Vec<i64> = (0..=30).map(counted).collect();
         let t_s = (0..=30).map(|row| 0.1 * f64::from(row) + jitter_s * f64::from(row * row % 7 - 3)).collect();
         let pose = |half: i32| {
-            let t_s = 0.1 * (f64::from(half / 2) + if half % 2 == 0 { 0.375 } else { 0.875 });
+            let t_s = 0.1 * (f64::from(half / 2) + shares[usize::from(half % 2 == 1)]);
             TruthSample::new(t_s, driven_m(t_s), 0.0, Some(0.0))
         };
         let wheels = WheelLog::Ticks(Wheels { left: ticks.clone(), right: ticks });
@@ -121,9 +155,10 @@ mod tests {
         // Ticks of 1 mm beside 0.3 mm: the pose at 7/8 of a row is of the row after it, and nearer to it than
         // the one at 3/8. Both are taken while the robot stands, from 2 s on.
         let taken = taken_s(&dataset(2.0, [314.16, 3e-4, 0.0]));
+        // Five rows before it stops, what an acceleration may do within a row is more than 0.3 mm.
         let driving: Vec<f64> = taken.iter().copied().filter(|t_s| *t_s < 1.9).collect();
         assert!(driving[2..].iter().all(|t_s| (t_s / 0.1).fract() > 0.8), "{driving:?}");
-        assert_eq!(driving.len(), 20, "{driving:?}");
+        assert_eq!((driving.len(), driving.last().copied()), (16, Some(1.4875)), "{driving:?}");
         assert_eq!(taken.iter().filter(|t_s| **t_s > 2.2).count(), 16);
     }
 
@@ -144,5 +179,24 @@ mod tests {
         for of in [[314.16, 3e-3, 0.0], [1e4, 3e-4, 0.0], [314.16, 3e-4, 0.01]] {
             assert_eq!(taken_s(&dataset(3.0, of)).len(), 60, "{of:?}");
         }
+    }
+
+    #[test]
+    fn poses_that_the_wheels_tell_less_well_than_the_instrument_are_left_out_where_others_stay() {
+        // A speed that swings by 0.3 m/s every 0.6 s: its acceleration, of 3 m/s², changes by about 3 m/s²
+        // from row to row, and half of that over a half row is 3.75 mm. A pose half a millisecond after a row
+        // is off by 0.07 mm.
+        let driven_m = |t_s: f64| 0.4 * t_s + 0.3 * 0.6 / 6.283 * (6.283 * t_s / 0.6).sin();
+        let taken = |sigma_m: f64, shares: [f64; 2]| {
+            taken_s(&dataset_along(driven_m, [1e5, sigma_m, 0.0], shares)).into_iter().skip(2).collect::<Vec<f64>>()
+        };
+        // Beside 1 mm those in the middle are left out, but for the last; rows that turn alike tell less there.
+        let near = taken(1e-3, [0.005, 0.5]);
+        let (last, others) = near.split_last().expect("a run of 60 poses");
+        let in_the_middle = others.iter().filter(|t_s| (**t_s / 0.1).fract() > 0.1).count();
+        assert!(in_the_middle == 0 && others.len() == 28 && *last > 2.9, "{near:?}");
+        // Beside 20 mm all stay, and where none is near a row as well.
+        assert_eq!(taken(2e-2, [0.005, 0.5]).len(), 58);
+        assert_eq!(taken(1e-3, [0.4, 0.5]).len(), 29);
     }
 }

@@ -14,7 +14,7 @@ use crate::model::Model;
 use crate::noise::NoisePrior;
 use crate::noise_shape::NoiseShape;
 use crate::partial_records::{GyroSettings, PartialSegment, partial_segments};
-use crate::poses_between_rows::take_one_for_each_row;
+use crate::poses_between_rows::{take_one_for_each_row, take_those_near_rows};
 use crate::segment::{MeasuredPose, Segment, Start};
 use crate::settings::{AUTOCORRELATION_DECAY, GYRO_SCALE_SIGMA, MIN_CHORD_RATIO, TIME_TOLERANCE_S};
 use crate::wheel_angles::{WheelAngleInterpolator, WheelInterval};
@@ -79,9 +79,10 @@ impl<'a> Records<'a> {
                     add_poses(&mut records.segments, &base, &track, run.run(), measured_poses(run, reference));
                     if let Some(nominal) = &nominal {
                         let rows_s = &run.odometry().t_s;
-                        records.segments[before..]
-                            .iter_mut()
-                            .for_each(|poses| take_one_for_each_row(poses, rows_s, nominal, reference));
+                        for poses in &mut records.segments[before..] {
+                            take_one_for_each_row(poses, rows_s, nominal, reference);
+                            take_those_near_rows(poses, nominal, reference);
+                        }
                     }
                     add_displacements(&mut records.segments, &base, &track, run.run());
                     if let Some(nominal) = &nominal {
