@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use effects::Sign;
 use estimation::NoiseComponent;
 
-use crate::augmented_model::{cost, count};
+use crate::augmented_model::{AugmentedModel, cost, count};
 use crate::candidate::terms;
 use crate::cause::{Basis, Cause, Doubt};
 use crate::check::{Check, Component, ResidualPersistence};
@@ -18,6 +18,7 @@ use crate::document::Value;
 use crate::finding;
 use crate::finding::Finding;
 use crate::mean_structure::MeanStructure;
+use crate::null_distribution::{NullDistribution, among_simulated};
 use crate::outlier_attribution::{ErrorSource, log_likelihoods};
 use crate::residual_tests::residual_persistence;
 use crate::run_to_run::differs_from_run_to_run;
@@ -135,10 +136,17 @@ fn with_sign(sign: Sign, without_ids: &[String]) -> Vec<Cause> {
 /// Turns that scatter more than the wheels' noise explains, whatever else was found.
 fn of_turns(structure: &MeanStructure<'_>, without_ids: &[String]) -> Option<Finding> {
     let model = structure.model();
-    let without = model.fit.without_noise(NoiseComponent::Turn, &mut terms(&model.candidates)).ok()?;
-    let most = count(&without).max(count(&model.fit));
-    let statistic = 2.0 * (cost(&without, most) - cost(&model.fit, most));
-    let p_value = 2.0 * (0.5 * p_of_chi_square(statistic.max(0.0), 1.0)).min(differs_from_run_to_run(model));
+    let (without, mut p_value) = without_turn_noise(model)?;
+    if p_value >= TURN_SCATTER_LEVEL {
+        return None;
+    }
+    if let Some(null) = NullDistribution::of(&without) {
+        let simulated = null.resimulated(|again| {
+            let fit = model.fit.on_runs_of(again, &mut terms(&model.candidates)).ok()?;
+            Some(without_turn_noise(&AugmentedModel { fit, ..model.clone() })?.1)
+        });
+        p_value = among_simulated(p_value, simulated.iter().flatten());
+    }
     if p_value >= TURN_SCATTER_LEVEL {
         return None;
     }
@@ -150,4 +158,14 @@ fn of_turns(structure: &MeanStructure<'_>, without_ids: &[String]) -> Option<Fin
     // Whatever else is unmodelled and differs from turn to turn has no other sign.
     found.or_unlisted(1.0, Doubt::ScattersAlike);
     Some(found)
+}
+
+/// The model without the turns' own noise, and the p-value of what that explains; `None` where the fit without
+/// it diverges.
+fn without_turn_noise<'a>(model: &AugmentedModel<'a>) -> Option<(AugmentedModel<'a>, f64)> {
+    let fit = model.fit.without_noise(NoiseComponent::Turn, &mut terms(&model.candidates)).ok()?;
+    let most = count(&fit).max(count(&model.fit));
+    let statistic = 2.0 * (cost(&fit, most) - cost(&model.fit, most));
+    let p_value = 2.0 * (0.5 * p_of_chi_square(statistic.max(0.0), 1.0)).min(differs_from_run_to_run(model));
+    Some((AugmentedModel { fit, ..model.clone() }, p_value))
 }

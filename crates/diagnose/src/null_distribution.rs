@@ -5,7 +5,7 @@
 //! simulated runs its mean and standard deviation say how far it does not, and z is judged by these. A score
 //! test's statistic, χ² by formula, is inflated by a factor where errors last; it is judged over that factor.
 
-use estimation::ModelFit;
+use estimation::{ModelFit, Projected, total};
 use rayon::prelude::*;
 
 use crate::augmented_model::AugmentedModel;
@@ -34,24 +34,45 @@ impl<'m, 'a> NullDistribution<'m, 'a> {
     /// By how much the score statistics of parts are inflated; 1 where they are not.
     pub(crate) fn inflation(&self, parts: &[&[Candidate]]) -> Vec<f64> {
         let scores = |fit: &ModelFit<'_>| {
-            scan_parts_of(fit, &self.model.candidates, parts, |own, projected, _| {
-                let (statistic, dimensions) = detectable_statistic(own, projected);
-                if dimensions > 0 { statistic / dimensions as f64 } else { 1.0 }
-            })
+            scan_parts_of(fit, &self.model.candidates, parts, |own, projected, _| ratio(own, projected))
         };
-        let simulated = self.resimulated(scores);
-        let mean = |part: usize| {
-            let of = simulated.iter().filter_map(|scores| scores.get(part));
-            let (sum, count) = of.fold((0.0, 0.0_f64), |(sum, count), score| (sum + score, count + 1.0));
-            if count > 0.0 { f64::max(sum / count, 1.0) } else { 1.0 }
+        means(&self.resimulated(scores), parts.len())
+    }
+
+    /// The same of the model's own candidates at their sizes, each beside the others.
+    pub(crate) fn inflation_of_own(&self) -> Vec<f64> {
+        let scores = |fit: &ModelFit<'_>| {
+            let Some(equations) = total(&fit.solution.pass.runs) else { return Vec::new() };
+            let score = |(index, candidate): (usize, &Candidate)| {
+                let own = self.model.columns(index);
+                let projection = fit.eliminated(&equations, &own)?;
+                Some(ratio(std::slice::from_ref(candidate), &projection.of_columns(&equations, &own)))
+            };
+            self.model.candidates.iter().enumerate().filter_map(score).collect()
         };
-        (0..parts.len()).map(mean).collect()
+        means(&self.resimulated(scores), self.model.candidates.len())
     }
 
     /// The same for one candidate.
     pub(crate) fn inflation_of(&self, candidate: &Candidate) -> f64 {
         self.inflation(&[std::slice::from_ref(candidate)]).first().copied().unwrap_or(1.0)
     }
+}
+
+/// A score statistic over what it is by formula, on average.
+fn ratio(own: &[Candidate], projected: &Projected) -> f64 {
+    let (statistic, dimensions) = detectable_statistic(own, projected);
+    if dimensions > 0 { statistic / dimensions as f64 } else { 1.0 }
+}
+
+/// The mean of each of several ratios over simulated runs, not below 1.
+fn means(simulated: &[Vec<f64>], ratios: usize) -> Vec<f64> {
+    let mean = |part: usize| {
+        let of = simulated.iter().filter_map(|scores| scores.get(part));
+        let (sum, count) = of.fold((0.0, 0.0_f64), |(sum, count), score| (sum + score, count + 1.0));
+        if count > 0.0 { f64::max(sum / count, 1.0) } else { 1.0 }
+    };
+    (0..ratios).map(mean).collect()
 }
 
 /// A p-value by formula, judged among those of simulated runs; it is made no stricter.
@@ -86,6 +107,13 @@ fn judged(z: f64, simulated: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn inflation_is_the_mean_of_what_simulated_runs_have_and_no_less_than_one() {
+        // A run whose fit determines nothing has no ratios.
+        assert_eq!(means(&[vec![2.0, 0.5], vec![4.0, 0.25], Vec::new()], 2), [3.0, 1.0]);
+        assert_eq!(means(&[], 1), [1.0]);
+    }
 
     #[test]
     fn a_value_is_judged_among_simulated_ones() {

@@ -11,6 +11,7 @@ use crate::candidate::Candidate;
 use crate::fit_cache::FitCache;
 use crate::geometry_deviations::keeps_wheels;
 use crate::model_comparison::{log_odds_margin, occam_factor, relative_odds};
+use crate::null_distribution::NullDistribution;
 use crate::physical::is_physical;
 use crate::ranking::Entry;
 use crate::settings::search::{
@@ -100,13 +101,15 @@ pub(crate) fn rivals<'a>(
     }
     let most = fits.iter().map(|extended| count(&extended.fit)).fold(count(&without.fit), f64::max);
     let base_cost = cost(&without.fit, most);
+    let inflation = inflation_of_each(without, index, &fits);
     let mut named: Vec<(Name, AugmentedModel<'a>)> = fits
         .into_iter()
-        .map(|extended| {
+        .zip(inflation)
+        .map(|(extended, inflation)| {
             let candidate = extended.candidates[index].clone();
             let variants = entries.iter().find(|entry| entry.scored.candidate.id() == candidate.id());
             let trials = variants.map_or(1, |entry| entry.variants.max(1));
-            let likelier = base_cost - cost(&extended.fit, most);
+            let likelier = (base_cost - cost(&extended.fit, most)) / inflation;
             let directions = wald_test(&extended, index).map(|(_, directions)| directions);
             let (log_odds, explains) = odds_and_explained(likelier, directions.as_deref(), trials);
             (Name { candidate, log_odds, explains, outdone: false }, extended)
@@ -125,6 +128,15 @@ pub(crate) fn rivals<'a>(
         name.outdone = best > name.log_odds + log_odds_margin(name.log_odds);
     }
     named
+}
+
+/// By how much coarse encoders inflate what models explain by their candidate at an index, beside the model
+/// without it; 1 where formulas hold. Log likelihoods of dependent errors are as much too large (Pace, Salvan &
+/// Sartori 2011).
+fn inflation_of_each(without: &AugmentedModel<'_>, index: usize, fits: &[AugmentedModel<'_>]) -> Vec<f64> {
+    let candidates: Vec<Candidate> = fits.iter().map(|extended| extended.candidates[index].clone()).collect();
+    let parts: Vec<&[Candidate]> = candidates.chunks(1).collect();
+    NullDistribution::of(without).map_or_else(|| vec![1.0; fits.len()], |null| null.inflation(&parts))
 }
 
 /// The score statistic from which on a candidate is a close rival of the best.

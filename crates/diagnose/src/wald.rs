@@ -124,15 +124,20 @@ fn over_runs(extended: &AugmentedModel<'_>, candidate: usize) -> Option<Vec<f64>
     Some(covariance.diagonal().iter().map(|variance| variance.sqrt() * widening).collect())
 }
 
-/// Each candidate's test beside the others, with the standard deviations that uncertain variants and causes
-/// add.
+/// Each candidate's test beside the others, as coarse encoders inflate it, with the standard deviations that
+/// uncertain variants and causes add.
 pub(crate) fn tests_of(model: &AugmentedModel<'_>, extra_sigma: &[Vec<f64>]) -> Vec<Test> {
     // As wide as Student's quantile is where measurements are few.
     let Some(equations) = total(&model.fit.solution.pass.runs) else { return Vec::new() };
-    let few = student_95(freedom(&model.fit, &equations)) / NORMAL_QUANTILE_95;
+    let freedom = freedom(&model.fit, &equations);
+    let few = student_95(freedom) / NORMAL_QUANTILE_95;
+    let inflation = NullDistribution::of(model).map(|null| null.inflation_of_own());
     let test = |(candidate, extra_sigma): (usize, &Vec<f64>)| {
-        let (mut test, _) = wald_test(model, candidate)?;
-        test.estimates.iter_mut().for_each(|(_, sigma)| *sigma *= few);
+        let (mut test, directions) = wald_test(model, candidate)?;
+        let inflation = inflation.as_ref().map_or(1.0, |of_each| of_each[candidate]);
+        test.statistic /= inflation;
+        test.p_value = p_of_statistic(test.statistic, directions.len(), freedom);
+        test.estimates.iter_mut().for_each(|(_, sigma)| *sigma *= few * inflation.sqrt());
         // Where runs differ more than the measurements' noise explains, the scatter between runs limits
         // what is known.
         if let Some(over_runs) = over_runs(model, candidate) {

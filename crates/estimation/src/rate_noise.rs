@@ -43,7 +43,7 @@ impl ModelFit<'_> {
 }
 
 /// Noise of the rates of a run.
-struct RateNoise {
+pub(crate) struct RateNoise {
     /// Instants of rows.
     t_s: Vec<f64>,
     /// Errors of the wheels' angles there, radians.
@@ -56,11 +56,9 @@ struct RateNoise {
 impl RateNoise {
     /// Of the segments of a run.
     fn of(segments: &[&mut Segment<'_>], mut draws: Xoshiro256PlusPlus) -> Self {
-        let RateWindow { rows, row_by_row } = segments[0].rate_window;
         let mut t_s: Vec<f64> = segments.iter().flat_map(|segment| instants_of_rows(&segment.intervals)).collect();
         t_s.sort_unstable_by(f64::total_cmp);
         t_s.dedup_by(|next, before| *next - *before <= TIME_TOLERANCE_S);
-        let pieces = pieces(&t_s, segments[0].info.continuous);
         let angle_rad = Side::BOTH.map(|side| {
             let mut turns = vec![false; t_s.len()];
             for interval in segments.iter().flat_map(|segment| &segment.intervals) {
@@ -82,11 +80,18 @@ impl RateNoise {
                 })
                 .collect::<Vec<f64>>()
         });
+        Self::of_errors(segments[0], t_s, angle_rad)
+    }
+
+    /// Of a segment whose angles are off by so much at the instants of its rows, which are as many.
+    pub(crate) fn of_errors(segment: &Segment<'_>, t_s: Vec<f64>, angle_rad: [Vec<f64>; 2]) -> Self {
+        let RateWindow { rows, row_by_row } = segment.rate_window;
+        let pieces = pieces(&t_s, segment.info.continuous);
         let rate_rad_s = angle_rad.each_ref().map(|errors| slopes(&t_s, errors, &pieces, rows));
         Self { t_s, angle_rad, rate_rad_s, row_by_row }
     }
 
-    fn add_to(&self, interval: &mut WheelInterval) {
+    pub(crate) fn add_to(&self, interval: &mut WheelInterval) {
         let next = self.t_s.partition_point(|t_s| *t_s <= interval.t_s + TIME_TOLERANCE_S);
         let (from, to) = (next.saturating_sub(1), next.min(self.t_s.len().saturating_sub(1)));
         let Some((from_s, to_s)) = self.t_s.get(from).zip(self.t_s.get(to)) else { return };

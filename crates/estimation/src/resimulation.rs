@@ -18,9 +18,11 @@ use crate::model::Instrument;
 use crate::model_fit::ModelFit;
 use crate::optimizer::Solution;
 use crate::propagation::{CarriedState, Propagator};
+use crate::rate_noise::RateNoise;
 use crate::rounding::PoseVariance;
 use crate::segment::{MeasuredPose, Segment, Start};
 use crate::settings::MIN_RESIMULATED_VARIANCE_RATIO;
+use crate::wheel_angles::WheelInterval;
 
 impl ModelFit<'_> {
     /// Has the rounding of counts a part in what measurements are off by, so that the distributions of tests
@@ -61,7 +63,7 @@ impl ModelFit<'_> {
         let mut carried: Option<CarriedState> = None;
         for (index, segment) in records.segments.iter_mut().enumerate() {
             let mut draws = Draws::of(number, index);
-            let smooth = smooth_turns(segment);
+            let smooth = smooth_turns(segment, &mut draws);
             let rolled = self.rolled(segment, &smooth, &mut draws);
             let before = carried.take().filter(|_| segment.continues);
             carried = Some(self.measure_again(segment, &rolled, index, before, terms, &mut draws));
@@ -141,9 +143,10 @@ impl ModelFit<'_> {
     }
 }
 
-/// How the wheels turned by their rates, interval by interval: without the rounding of single rows.
-fn smooth_turns(segment: &Segment<'_>) -> Vec<Wheels<f64>> {
-    let of = |interval: &crate::wheel_angles::WheelInterval| {
+/// How the wheels turned by their rates, interval by interval: without the rounding of single rows. Between
+/// two rests the rates add up to whole counts, where a wheel stops anywhere between two.
+fn smooth_turns(segment: &Segment<'_>, draws: &mut Draws) -> Vec<Wheels<f64>> {
+    let of = |interval: &WheelInterval| {
         let [start, end] = interval.rate_at_ends_rad_s;
         if interval.stands {
             Wheels::both(0.0)
@@ -151,19 +154,33 @@ fn smooth_turns(segment: &Segment<'_>) -> Vec<Wheels<f64>> {
             start.zip_with(end, |start, end| 0.5 * (start + end) * interval.dt_s)
         }
     };
-    segment.intervals.iter().map(of).collect()
+    let mut smooth: Vec<Wheels<f64>> = segment.intervals.iter().map(of).collect();
+    for moving in smooth.chunk_by_mut(|a, b| (*a == Wheels::both(0.0)) == (*b == Wheels::both(0.0))) {
+        for side in Side::BOTH {
+            let turned_rad: f64 = moving.iter().map(|of| of[side].abs()).sum();
+            if turned_rad > 0.0 {
+                let more = segment.quantum_rad[side] * (draws.uniform() - draws.uniform()) / turned_rad;
+                moving.iter_mut().for_each(|of| of[side] += more * of[side].abs());
+            }
+        }
+    }
+    smooth
 }
 
 /// Counts the smoothed turns at the ends of rows, each wheel from a random phase on. Within a row the counts
-/// go as the smoothed turns do, as those of a log are interpolated.
+/// go as the smoothed turns do, as those of a log are interpolated; rates have the rounding of the counts
+/// around them, as a log's have.
 fn count_again(segment: &mut Segment<'_>, smooth: &[Wheels<f64>], draws: &mut Draws) {
-    for side in Side::BOTH {
+    let Some(start_s) = segment.intervals.first().map(|first| first.t_s) else { return };
+    let mut rows_s = vec![start_s];
+    let rounding_rad = Side::BOTH.map(|side| {
         let quantum_rad = segment.quantum_rad[side];
         let phase = draws.uniform();
         let counted = |turned_rad: f64| {
             if quantum_rad > 0.0 { (turned_rad / quantum_rad + phase).floor() * quantum_rad } else { turned_rad }
         };
         let (mut turned_rad, mut before) = (0.0, counted(0.0));
+        let mut rounding_rad = vec![before];
         let mut first = 0;
         for row in segment.intervals.chunk_by_mut(|_, next| next.starts_within_row) {
             let smooth = &smooth[first..first + row.len()];
@@ -176,9 +193,16 @@ fn count_again(segment: &mut Segment<'_>, smooth: &[Wheels<f64>], draws: &mut Dr
                 let share = if of_row == 0.0 { interval.dt_s / row_s } else { smooth[side] / of_row };
                 interval.wheel_rad[side] = (now - before) * share;
             }
+            if side == Side::Left {
+                rows_s.push(rows_s[rows_s.len() - 1] + row_s);
+            }
+            rounding_rad.push(now - turned_rad);
             before = now;
         }
-    }
+        rounding_rad
+    });
+    let rounding = RateNoise::of_errors(segment, rows_s, rounding_rad);
+    segment.intervals.iter_mut().for_each(|interval| rounding.add_to(interval));
 }
 
 /// Draws of one segment: addressed by its number and that of the simulation.
@@ -209,5 +233,93 @@ impl Draws {
 
     fn uniform(&mut self) -> f64 {
         self.0.random::<f64>()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::records::Records;
+    use crate::wheel_rates::{pieces, slopes};
+    use dataset::{Dataset, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, WheelLog};
+
+    /// Thirty seconds in rows of 0.1 s, counts of 0.2 rad: 3 rad/s from 5 to 25 s, and rest.
+    fn dataset() -> Dataset {
+        let t_s: Vec<f64> = (0..=300).map(|row| 0.1 * f64::from(row)).collect();
+        let counts: Vec<i64> = t_s.iter().map(|t_s| (15.0 * (t_s - 5.0).clamp(0.0, 20.0)).floor() as i64).collect();
+        let truth = t_s.iter().map(|t_s| TruthSample::new(*t_s, 0.0, 0.0, Some(0.0))).collect();
+        let wheels = WheelLog::Ticks(Wheels { left: counts.clone(), right: counts });
+        Dataset {
+            provenance: Provenance::default(),
+            robot: NominalRobot {
+                left_wheel_diameter_m: 0.1,
+                right_wheel_diameter_m: 0.1,
+                wheel_separation_m: 0.3,
+                ticks_per_rev: Some(std::f64::consts::TAU / 0.2),
+                counter_bits: None,
+            },
+            truth_noise: TruthNoise::default(),
+            points: Vec::new(),
+            runs: vec![Run {
+                info: RunInfo { continuous: true, ..RunInfo::default() },
+                odometry: Odometry { t_s: t_s.into(), wheels, ..Odometry::default() },
+                truth,
+                ..Run::default()
+            }],
+        }
+    }
+
+    #[test]
+    fn between_two_rests_a_wheel_turns_by_any_part_of_a_count_more_or_less() {
+        let dataset = dataset();
+        let records = Records::of(&[dataset.session()]);
+        let segment = &records.segments[0];
+        let of_draw = |number: u64| {
+            let smooth = smooth_turns(segment, &mut Draws::of(number, 0));
+            let of_rests = segment.intervals.iter().zip(&smooth).filter(|(interval, _)| interval.stands);
+            assert!(of_rests.clone().count() > 50 && of_rests.clone().all(|(_, of)| *of == Wheels::both(0.0)));
+            smooth.iter().fold(Wheels::both(0.0), |sum, of| sum.zip_with(*of, |sum, of| sum + of))
+        };
+        let turned: Vec<Wheels<f64>> = (0..400).map(of_draw).collect();
+        let mean = turned.iter().map(|of| of.left).sum::<f64>() / 400.0;
+        let variance = turned.iter().map(|of| (of.left - mean).powi(2)).sum::<f64>() / 399.0;
+        // The difference of two uniform phases has the variance q²/6, a standard error of 6 % of it over 400,
+        // and their mean one of 4e-3. Rejects whole counts, and the phase of one end alone.
+        assert!((variance / (0.2 * 0.2 / 6.0) - 1.0).abs() < 0.24, "{variance}");
+        let by_rates = |of: &WheelInterval| {
+            let [start, end] = of.rate_at_ends_rad_s;
+            if of.stands { 0.0 } else { 0.5 * (start.left + end.left) * of.dt_s }
+        };
+        let rates_rad: f64 = segment.intervals.iter().map(by_rates).sum();
+        assert!((mean - rates_rad).abs() < 0.016 && (rates_rad - 60.0).abs() < 0.1, "{mean} {rates_rad}");
+        assert!(turned.iter().any(|of| (of.left - of.right).abs() > 0.05), "each wheel has its own");
+    }
+
+    #[test]
+    fn rates_are_those_of_the_counts_that_were_counted_again() {
+        let dataset = dataset();
+        let records = Records::of(&[dataset.session()]);
+        let mut segment = records.segments[0].clone();
+        // A path without noise, of 1.4 counts a row.
+        for interval in &mut segment.intervals {
+            (interval.rate_rad_s, interval.rate_at_ends_rad_s) = (Wheels::both(2.8), [Wheels::both(2.8); 2]);
+        }
+        let smooth: Vec<Wheels<f64>> = segment.intervals.iter().map(|of| Wheels::both(2.8 * of.dt_s)).collect();
+        count_again(&mut segment, &smooth, &mut Draws::of(1, 0));
+        let (mut t_s, mut counted_rad) = (vec![segment.intervals[0].t_s], vec![0.0]);
+        for interval in &segment.intervals {
+            t_s.push(interval.t_s + interval.dt_s);
+            counted_rad.push(counted_rad[counted_rad.len() - 1] + interval.wheel_rad.left);
+        }
+        let half = segment.rate_window.rows;
+        let rates = slopes(&t_s, &counted_rad, &pieces(&t_s, true), half);
+        let mut varied = 0;
+        // Slopes are linear: of a path and of its rounding they are those of the counts. At the ends too.
+        for (k, interval) in segment.intervals.iter().enumerate() {
+            assert!((interval.rate_at_ends_rad_s[0].left - rates[k]).abs() < 1e-9, "{k}");
+            assert!((interval.rate_at_ends_rad_s[1].left - rates[k + 1]).abs() < 1e-9, "{k}");
+            varied += usize::from((rates[k] - 2.8).abs() > 1e-3);
+        }
+        assert!(half > 0 && varied > 100, "{half} {varied}");
     }
 }
