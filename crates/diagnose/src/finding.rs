@@ -194,8 +194,13 @@ pub(crate) fn of_sparse(candidate: &Candidate, test: &Test, p_value: f64, trials
     })
 }
 
-/// Something is left, and nothing that was tried explains it.
-pub(crate) fn of_failed_checks(checked: &Checked, without: &[String]) -> Option<Finding> {
+/// Something is left, and nothing that was tried explains it, but for effects that were refused for what they
+/// do to other runs.
+pub(crate) fn of_failed_checks(
+    checked: &Checked,
+    without: &[String],
+    refused: impl Iterator<Item = &'static str>,
+) -> Option<Finding> {
     let failed: Vec<Check> = checked.checks.iter().filter(|test| !test.passes).map(|test| test.check.clone()).collect();
     // Heavy tails have causes of their own: the p-value is that of the tests of dependence.
     let least = |tests: &mut dyn Iterator<Item = &TestResult>| tests.map(|test| test.p_value).reduce(f64::min);
@@ -207,8 +212,10 @@ pub(crate) fn of_failed_checks(checked: &Checked, without: &[String]) -> Option<
     let only_correlated = failed.iter().all(|check| matches!(check, Check::Whiteness(_)));
     let sign = only_correlated.then_some(Sign::AutocorrelatedErrors);
     let errors = sign.into_iter().flat_map(|sign| with_sign(sign, without)).map(Cause::Effect);
+    let of_dependence = failed.iter().any(|check| matches!(check, Check::Covariate(_)));
+    let refused = refused.filter(|_| of_dependence).map(Cause::Effect);
     // Whatever else was left out of the model is as likely, and has no name.
-    let causes = [Cause::Unknown].into_iter().chain(errors).collect();
+    let causes = [Cause::Unknown].into_iter().chain(errors).chain(refused).collect();
     Some(of_causes(causes, worst, BTreeMap::new(), Basis::FailedTests(failed)))
 }
 

@@ -199,7 +199,9 @@ fn failed_checks(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> 
     let scatters = findings.iter().any(is_scatter) && !structure.checked.checks.iter().any(plainly);
     let is_reported = structure.unlisted.is_some() || findings.iter().any(Finding::is_unlisted);
     if !(results.restored() || scatters || is_reported) {
-        findings.extend(finding::of_failed_checks(&structure.checked, results.without));
+        let refusals = structure.found.refusals.iter();
+        let refused = refusals.filter(|(_, refusal)| refusal.is_for_other_runs()).map(|(id, _)| *id);
+        findings.extend(finding::of_failed_checks(&structure.checked, results.without, refused));
     }
     findings
 }

@@ -40,6 +40,13 @@ pub enum Refusal {
     Cancels,
 }
 
+impl Refusal {
+    /// Whether it explains what all runs show together, and is refused for what it does to single ones.
+    pub(crate) const fn is_for_other_runs(self) -> bool {
+        matches!(self, Self::NotOverRuns | Self::PredictsWorse | Self::DriftsMore)
+    }
+}
+
 /// The last refusal of each effect, by its id.
 pub(crate) type Refusals = BTreeMap<&'static str, Refusal>;
 

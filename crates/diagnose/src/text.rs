@@ -161,8 +161,13 @@ fn basis(finding: &Finding) -> String {
             )
         }
         Basis::FailedTests(failed) => {
+            let of_dependence = failed.iter().any(|check| matches!(check, Check::Covariate(_)));
             let failed = failed.iter().map(Check::name).collect::<Vec<_>>().join(", ");
-            if finding.causes.len() > 1 {
+            if finding.causes.len() > 1 && of_dependence {
+                format!(
+                    "the residuals are not what the model says ({failed}), and what explains them does not hold over the runs"
+                )
+            } else if finding.causes.len() > 1 {
                 format!("the residuals are autocorrelated ({failed}), and nothing that was recorded explains it")
             } else {
                 format!(

@@ -98,6 +98,8 @@ fn nearest_row(rows_s: &[f64], t_s: f64) -> usize {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::TAU;
+
     use super::*;
     use crate::records::Records;
     use dataset::{Dataset, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, WheelLog};
@@ -186,7 +188,7 @@ mod tests {
         // A speed that swings by 0.3 m/s every 0.6 s: its acceleration, of 3 m/s², changes by about 3 m/s²
         // from row to row, and half of that over a half row is 3.75 mm. A pose half a millisecond after a row
         // is off by 0.07 mm.
-        let driven_m = |t_s: f64| 0.4 * t_s + 0.3 * 0.6 / 6.283 * (6.283 * t_s / 0.6).sin();
+        let driven_m = |t_s: f64| 0.4 * t_s + 0.3 * 0.6 / TAU * (TAU * t_s / 0.6).sin();
         let taken = |sigma_m: f64, shares: [f64; 2]| {
             taken_s(&dataset_along(driven_m, [1e5, sigma_m, 0.0], shares)).into_iter().skip(2).collect::<Vec<f64>>()
         };

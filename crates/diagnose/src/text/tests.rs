@@ -86,6 +86,10 @@ fn a_term_and_failed_tests_are_said_by_themselves() {
         said(failed(), &[Cause::Unknown], &[]),
         "the residuals are not what the model says (outliers, white_heading), and nothing in the catalogue explains it: the cause is not determined"
     );
+    let by_speed = Basis::FailedTests(vec![Check::Covariate("speed".to_owned())]);
+    assert!(said(by_speed, &[Cause::Unknown, SLIP], &[]).ends_with(
+        "the residuals are not what the model says (speed), and what explains them does not hold over the runs"
+    ));
     assert!(said(failed(), &[Cause::Unknown, SLIP], &[]).starts_with(
         "one of unlisted, slip_speed; this data cannot tell which: the residuals are autocorrelated (outliers, white"
     ));
