@@ -160,8 +160,8 @@ fn of_turns(structure: &MeanStructure<'_>, without_ids: &[String]) -> Option<Fin
     Some(found)
 }
 
-/// The model without the turns' own noise, and the p-value of what that explains; `None` where the fit without
-/// it diverges.
+/// The model without the turns' own noise, and the p-value of what that explains; `None` where the fit
+/// without it diverges.
 fn without_turn_noise<'a>(model: &AugmentedModel<'a>) -> Option<(AugmentedModel<'a>, f64)> {
     let fit = model.fit.without_noise(NoiseComponent::Turn, &mut terms(&model.candidates)).ok()?;
     let most = count(&fit).max(count(&model.fit));

@@ -138,8 +138,8 @@ pub(crate) fn rivals<'a>(
 }
 
 /// By how much coarse encoders inflate what models explain by their candidate at an index, beside the model
-/// without it; 1 where formulas hold. Log likelihoods of dependent errors are as much too large (Pace, Salvan &
-/// Sartori 2011).
+/// without it; 1 where formulas hold. Log likelihoods of dependent errors are as much too large (Pace, Salvan
+/// & Sartori 2011).
 fn inflation_of_each(without: &AugmentedModel<'_>, index: usize, fits: &[AugmentedModel<'_>]) -> Vec<f64> {
     let candidates: Vec<Candidate> = fits.iter().map(|extended| extended.candidates[index].clone()).collect();
     let parts: Vec<&[Candidate]> = candidates.chunks(1).collect();
