@@ -192,7 +192,7 @@ mod tests {
         let taken = |sigma_m: f64, shares: [f64; 2]| {
             taken_s(&dataset_along(driven_m, [1e5, sigma_m, 0.0], shares)).into_iter().skip(2).collect::<Vec<f64>>()
         };
-        // Beside 1 mm those in the middle are left out, but for the last; rows that turn alike tell less there.
+        // Beside 1 mm those in the middle are left out, but for the last.
         let near = taken(1e-3, [0.005, 0.5]);
         let (last, others) = near.split_last().expect("a run of 60 poses");
         let in_the_middle = others.iter().filter(|t_s| (**t_s / 0.1).fract() > 0.1).count();
