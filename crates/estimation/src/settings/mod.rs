@@ -6,6 +6,7 @@
 
 mod map;
 mod partial;
+mod poses_between_rows;
 mod thinning;
 
 pub(crate) use map::{
@@ -17,6 +18,7 @@ pub(crate) use partial::{
     START_HEADING_SIGMA_RAD, START_POSITION_SIGMA_M, WALL_DIRECTION_SIGMA_RAD, WALL_OFFSET_SIGMA_M,
     WALL_START_DIRECTIONS, WALL_START_STEPS,
 };
+pub(crate) use poses_between_rows::{MAX_INTERPOLATED_VARIANCE_RATIO, MAX_SHARED_VARIANCE_RATIO, MIN_POSES_NEAR_ROWS};
 pub(crate) use thinning::{MIN_MEASUREMENTS_PER_RUN, SPACING_SLACK, THINNING_FACTOR, THINNING_PHASES};
 
 // Numbers of arithmetic.
@@ -179,20 +181,6 @@ pub(crate) const ROWS_OF_CHANGE: usize = 5;
 /// Variance that rounding adds to a pose, over that of a measurement, below which it is left out.
 /// Budgeted: it changes a standard deviation by 0.05 %.
 pub(crate) const MIN_ROUNDING_VARIANCE_RATIO: f64 = 1e-3;
-
-/// Variance that poses of one row have in common, over that of the instrument, up to which all are taken.
-/// Budgeted: the mean of many then varies by a few tenths more than is said, in the worst case.
-pub(crate) const MAX_SHARED_VARIANCE_RATIO: f64 = 0.1;
-
-/// Variance of what the log does not tell between two rows, over that of the instrument, up to which a pose
-/// between them is taken.
-/// Tuned: of 200 nulls under motion capture (seeds 18018 and 20020) 15 have a finding with all poses, 11 up
-/// to 1, 12 up to 0.3 and 15 up to 0.1; right first causes 83 of 94, 83 of 90, 85 of 92 and 85 of 91.
-pub(crate) const MAX_INTERPOLATED_VARIANCE_RATIO: f64 = 1.0;
-
-/// Poses of a segment near its rows from which on the others are left out.
-/// Budgeted: the scatter of eight says a variance to a half of itself.
-pub(crate) const MIN_POSES_NEAR_ROWS: usize = 8;
 
 /// Farthest extrapolation beyond a log's first or last row, as a share of the interval there.
 /// Derived: beyond half an interval another row would have been written.
