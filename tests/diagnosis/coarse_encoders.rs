@@ -17,16 +17,16 @@ fn regress_rounding_is_no_scatter_of_turns() {
     assert_eq!(said(22_022, 28), Vec::<String>::new());
 }
 
-/// A vehicle with ticks of 6.9 mm: `missed_counts` at z = 9.6, as what it explains was not judged by simulated
-/// runs once it took another's place, and `backlash` in runs that were simulated to stop at whole counts.
+/// A vehicle with ticks of 6.9 mm: `missed_counts` at z = 9.6, as what it explains was not judged by
+/// simulated runs once it took another's place, and `backlash`, as simulated runs stopped at whole counts.
 #[test]
 fn regress_rounding_is_no_slip_and_no_play() {
     assert_eq!(said(22_022, 104), Vec::<String>::new());
     assert_eq!(said(20_020, 60), Vec::<String>::new());
 }
 
-/// Squares of a toy whose wheels are 50 mm apart, ticks of 0.3 mm: `castor_drag` at z = 23, whose covariate has
-/// the rounding of the counts in it.
+/// Squares of a toy whose wheels are 50 mm apart, ticks of 0.3 mm: `castor_drag` at z = 23, whose covariate
+/// has the rounding of the counts in it.
 #[test]
 fn regress_rounding_within_a_covariate_is_no_effect() {
     assert!(said(20_020, 92).iter().all(|names| !names.contains("castor_drag")));
