@@ -53,18 +53,22 @@ pub(crate) fn take_one_for_each_row(segment: &mut Segment<'_>, rows_s: &[f64], n
 }
 
 /// Leaves out poses whose wheels' turns between rows are known less well than the instrument measures, but
-/// for the first two and the last, where enough others stay.
+/// for the first two and the last, where enough others stay. Where a row's own rounding is more than that, no
+/// pose is known better, and all are taken.
 pub(crate) fn take_those_near_rows(segment: &mut Segment<'_>, nominal: &Model, reference: [f64; 2]) {
-    let Segment { measurements, intervals, .. } = segment;
+    let Segment { measurements, intervals, quantum_rad, .. } = segment;
+    let at_row = PoseVariance::of_rounding(*quantum_rad, nominal);
     let is_near = |measured: &MeasuredPose| {
         let Some(last) = measured.after.checked_sub(1) else { return true };
         let interpolated = PoseVariance::of(intervals[last].interpolated_rad2[1], nominal);
-        let is_within = |interpolated: f64, sigma: f64, factor: f64| {
-            interpolated <= MAX_INTERPOLATED_VARIANCE_RATIO * sigma * sigma * factor
+        let is_within = |interpolated: f64, at_row: f64, [sigma, factor]: [f64; 2]| {
+            let measured = sigma * sigma * factor;
+            interpolated <= MAX_INTERPOLATED_VARIANCE_RATIO * measured || at_row > measured
         };
         let ([position, heading], [of_position, of_heading]) = (reference, measured.variance_factor);
-        is_within(interpolated.along_m2, position, of_position)
-            && (measured.theta_rad.is_none() || is_within(interpolated.heading_rad2, heading, of_heading))
+        is_within(interpolated.along_m2, at_row.along_m2, [position, of_position])
+            && (measured.theta_rad.is_none()
+                || is_within(interpolated.heading_rad2, at_row.heading_rad2, [heading, of_heading]))
     };
     let last = measurements.len().saturating_sub(1);
     let numbered = measurements.iter().enumerate();
