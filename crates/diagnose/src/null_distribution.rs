@@ -45,10 +45,11 @@ impl<'m, 'a> NullDistribution<'m, 'a> {
             let Some(equations) = total(&fit.solution.pass.runs) else { return Vec::new() };
             let score = |(index, candidate): (usize, &Candidate)| {
                 let own = self.model.columns(index);
-                let projection = fit.eliminated(&equations, &own)?;
-                Some(ratio(std::slice::from_ref(candidate), &projection.of_columns(&equations, &own)))
+                fit.eliminated(&equations, &own).map_or(1.0, |projection| {
+                    ratio(std::slice::from_ref(candidate), &projection.of_columns(&equations, &own))
+                })
             };
-            self.model.candidates.iter().enumerate().filter_map(score).collect()
+            self.model.candidates.iter().enumerate().map(score).collect()
         };
         means(&self.resimulated(scores), self.model.candidates.len())
     }

@@ -240,8 +240,9 @@ impl Draws {
 mod tests {
     use super::*;
     use crate::records::Records;
+    use crate::tests::dataset_of;
     use crate::wheel_rates::{pieces, slopes};
-    use dataset::{Dataset, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, WheelLog};
+    use dataset::{Dataset, Odometry, TruthSample, WheelLog};
 
     /// Thirty seconds in rows of 0.1 s, counts of 0.2 rad: 3 rad/s from 5 to 25 s, and rest.
     fn dataset() -> Dataset {
@@ -249,24 +250,11 @@ mod tests {
         let counts: Vec<i64> = t_s.iter().map(|t_s| (15.0 * (t_s - 5.0).clamp(0.0, 20.0)).floor() as i64).collect();
         let truth = t_s.iter().map(|t_s| TruthSample::new(*t_s, 0.0, 0.0, Some(0.0))).collect();
         let wheels = WheelLog::Ticks(Wheels { left: counts.clone(), right: counts });
-        Dataset {
-            provenance: Provenance::default(),
-            robot: NominalRobot {
-                left_wheel_diameter_m: 0.1,
-                right_wheel_diameter_m: 0.1,
-                wheel_separation_m: 0.3,
-                ticks_per_rev: Some(std::f64::consts::TAU / 0.2),
-                counter_bits: None,
-            },
-            truth_noise: TruthNoise::default(),
-            points: Vec::new(),
-            runs: vec![Run {
-                info: RunInfo { continuous: true, ..RunInfo::default() },
-                odometry: Odometry { t_s: t_s.into(), wheels, ..Odometry::default() },
-                truth,
-                ..Run::default()
-            }],
-        }
+        let mut dataset = dataset_of(1, true);
+        dataset.robot.ticks_per_rev = Some(std::f64::consts::TAU / 0.2);
+        dataset.runs[0].truth = truth;
+        dataset.runs[0].odometry = Odometry { t_s: t_s.into(), wheels, ..Odometry::default() };
+        dataset
     }
 
     #[test]
