@@ -48,6 +48,11 @@ pub(crate) enum Check {
 }
 
 impl Check {
+    /// Whether residuals are asked of a covariate by it.
+    pub(crate) const fn is_of_covariate(&self) -> bool {
+        matches!(self, Self::Covariate(_))
+    }
+
     /// Its key in JSON.
     pub(crate) fn name(&self) -> String {
         match self {
@@ -76,7 +81,7 @@ pub(crate) struct TestResult {
 impl TestResult {
     /// Whether residuals depend on a covariate by it.
     pub(crate) fn shows_dependence(&self) -> bool {
-        !self.passes && matches!(self.check, Check::Covariate(_))
+        !self.passes && self.check.is_of_covariate()
     }
 
     /// As scripts get it.

@@ -212,7 +212,7 @@ pub(crate) fn of_failed_checks(
     let only_correlated = failed.iter().all(|check| matches!(check, Check::Whiteness(_)));
     let sign = only_correlated.then_some(Sign::AutocorrelatedErrors);
     let errors = sign.into_iter().flat_map(|sign| with_sign(sign, without)).map(Cause::Effect);
-    let of_dependence = failed.iter().any(|check| matches!(check, Check::Covariate(_)));
+    let of_dependence = checked.checks.iter().any(TestResult::shows_dependence);
     let refused = refused.filter(|_| of_dependence).map(Cause::Effect);
     // Whatever else was left out of the model is as likely, and has no name.
     let causes = [Cause::Unknown].into_iter().chain(errors).chain(refused).collect();

@@ -137,10 +137,9 @@ fn with_sign(sign: Sign, without_ids: &[String]) -> Vec<Cause> {
 fn of_turns(structure: &MeanStructure<'_>, without_ids: &[String]) -> Option<Finding> {
     let model = structure.model();
     let (without, mut p_value) = without_turn_noise(model)?;
-    if p_value >= TURN_SCATTER_LEVEL {
-        return None;
-    }
-    if let Some(null) = NullDistribution::of(&without) {
+    if p_value < TURN_SCATTER_LEVEL
+        && let Some(null) = NullDistribution::of(&without)
+    {
         let simulated = null.resimulated(|again| {
             let fit = model.fit.on_runs_of(again, &mut terms(&model.candidates)).ok()?;
             Some(without_turn_noise(&AugmentedModel { fit, ..model.clone() })?.1)

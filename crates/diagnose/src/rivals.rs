@@ -57,6 +57,8 @@ pub(crate) struct Name {
     pub(crate) log_odds: f64,
     /// Log likelihood less its expected gain without the effect: half of a χ² for each direction.
     pub(crate) explains: f64,
+    /// By how much coarse encoders inflate what it explains; 1 where formulas hold.
+    pub(crate) inflation: f64,
     /// A model with unphysical sizes explains more: the cause resembles this one, and may be none of the
     /// candidates.
     pub(crate) outdone: bool,
@@ -119,7 +121,7 @@ pub(crate) fn rivals<'a>(
             let likelier = (base_cost - cost(&extended.fit, most)) / inflation;
             let directions = wald_test(&extended, index).map(|(_, directions)| directions);
             let (log_odds, explains) = odds_and_explained(likelier, directions.as_deref(), trials);
-            (Name { candidate, log_odds, explains, outdone: false }, extended)
+            (Name { candidate, log_odds, explains, inflation, outdone: false }, extended)
         })
         .collect();
     named.sort_by(|a, b| b.0.log_odds.total_cmp(&a.0.log_odds));

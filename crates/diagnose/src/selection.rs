@@ -17,7 +17,7 @@ use crate::run_to_run::differs_from_run_to_run;
 use crate::settings::levels::{CLUSTER_ROBUST_LEVEL, MAX_EFFECTS, SCAN_LEVEL, TURN_SCATTER_LEVEL};
 use crate::settings::search::{MAX_CANCELLATION, MAX_CANDIDATES_TRIED, MAX_DRIFT_INCREASE_INTERVALS};
 use crate::statistics::sidak;
-use crate::wald::{Test, cluster_robust_test, deflated_p_value, tests_of, wald_test};
+use crate::wald::{Test, cluster_robust_test, deflated_p_value, p_value_over, tests_of, wald_test};
 
 /// What the search found.
 #[derive(Debug, Clone)]
@@ -243,7 +243,7 @@ pub(crate) fn search<'a>(
         };
         let tests = tests_in(&entries);
         let is_significant = |(name, extended): &(Name, AugmentedModel<'_>)| {
-            deflated_p_value(&without, extended, index)
+            p_value_over(extended, index, name.inflation)
                 .is_some_and(|p_value| sidak(p_value, variants(name.candidate.id())) * tests <= level)
         };
         // A term that predicts held-out runs worse, or with which odometry drifts significantly more, is

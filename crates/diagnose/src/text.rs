@@ -161,7 +161,7 @@ fn basis(finding: &Finding) -> String {
             )
         }
         Basis::FailedTests(failed) => {
-            let of_dependence = failed.iter().any(|check| matches!(check, Check::Covariate(_)));
+            let of_dependence = failed.iter().any(Check::is_of_covariate);
             let failed = failed.iter().map(Check::name).collect::<Vec<_>>().join(", ");
             if finding.causes.len() > 1 && of_dependence {
                 format!(

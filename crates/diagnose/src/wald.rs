@@ -62,11 +62,15 @@ pub(crate) fn deflated_p_value(
     extended: &AugmentedModel<'_>,
     candidate: usize,
 ) -> Option<f64> {
+    let inflation = NullDistribution::of(without).map(|null| null.inflation_of(&extended.candidates[candidate]));
+    p_value_over(extended, candidate, inflation.unwrap_or(1.0))
+}
+
+/// The same where the inflation is known.
+pub(crate) fn p_value_over(extended: &AugmentedModel<'_>, candidate: usize, inflation: f64) -> Option<f64> {
     let (test, directions) = wald_test(extended, candidate)?;
-    let Some(null) = NullDistribution::of(without) else { return Some(test.p_value) };
     let equations = total(&extended.fit.solution.pass.runs)?;
-    let statistic = test.statistic / null.inflation_of(&extended.candidates[candidate]);
-    Some(p_of_statistic(statistic, directions.len(), freedom(&extended.fit, &equations)))
+    Some(p_of_statistic(test.statistic / inflation, directions.len(), freedom(&extended.fit, &equations)))
 }
 
 /// Cluster-robust test of a candidate along its own size. Errors are alike within runs (a wheelbase that

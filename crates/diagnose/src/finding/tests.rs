@@ -75,7 +75,7 @@ fn test(p_value: f64, statistic: f64) -> Test {
 }
 
 fn name(id: &'static str, log_odds: f64, outdone: bool) -> Name {
-    Name { candidate: effect(id), log_odds, explains: log_odds, outdone }
+    Name { candidate: effect(id), log_odds, explains: log_odds, inflation: 1.0, outdone }
 }
 
 fn is_near(found: f64, expected: f64) -> bool {
