@@ -27,6 +27,7 @@ mod receipt_delays;
 mod record;
 mod retained_rows;
 mod row_lengths;
+mod row_numbers;
 mod sampling_period;
 mod session;
 mod settings;

@@ -8,6 +8,7 @@
 //! path with its own idea of how late rows usually are, so that a clock need not keep one beat all day.
 
 use crate::receipt_delays::Received;
+use crate::row_numbers::likeliest_numbers;
 
 /// Rows from which on a log has a beat: the line through so many is off by a fifth of what stamps jitter by.
 const MIN_ROWS: usize = 24;
@@ -28,28 +29,11 @@ const PHASE_SPANS: [(usize, [f64; 2], u32); 4] =
 const SPANS: usize = 8;
 /// Spans of which phases are taken.
 const PHASES_TAKEN: usize = 1000;
-/// Paths that are followed side by side.
-const PATHS: usize = 8;
-/// Rows over which a path's idea of how late rows usually are forgets.
-const MEMORY_ROWS: f64 = 200.0;
-/// Rows whose middle one says how late rows usually are, at first.
-const FIRST_ROWS: usize = 9;
-/// Log odds against a lost row, against each further one with it, and against a pause however long: rows are
-/// lost a few in a thousand, several together more often than independently.
-const LOST_COST: f64 = 8.0;
-const FURTHER_LOST_COST: f64 = 2.0;
-const PAUSE_COST: f64 = 14.0;
-/// The same against a row that came by itself.
-const BY_ITSELF_COST: f64 = 10.0;
-/// Deviations beyond which an error costs in proportion to its size (Huber 1964).
-const HUBER_SIGMAS: f64 = 1.5;
 /// Where stamps are later than that share of the beat, root mean square, some numbers of rows are wrong.
 const MAX_CERTAIN_LATENESS: f64 = 0.25;
 /// Share of the beat that stamps jitter by, up to which a row that came by itself is told from a late one: by
 /// five standard deviations halfway between ticks.
 const MAX_JITTER_BESIDE: f64 = 0.1;
-/// Share of the beat by which stamps are held to jitter at the least: what rounded file formats leave.
-const MIN_JITTER: f64 = 0.02;
 
 /// The regular beat of a run's rows.
 #[derive(Debug, Clone, PartialEq)]
@@ -120,7 +104,7 @@ fn root_mean_square(values: &[f64]) -> f64 {
     (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-fn median(mut values: Vec<f64>) -> Option<f64> {
+pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
@@ -202,84 +186,6 @@ fn whole_gaps(t_s: &[f64], period_s: f64) -> Option<Vec<i64>> {
         numbers.push(last);
     }
     Some(numbers)
-}
-
-/// One way to number the rows so far.
-#[derive(Debug, Clone, Copy)]
-struct Path {
-    number: i64,
-    cost: f64,
-    /// How late rows usually are on it, in beats.
-    usual: f64,
-    /// The path that it goes on from, among those of the row before.
-    from: u8,
-}
-
-/// Cost of a row that is later than usual by so much of its standard deviation.
-fn huber(deviation: f64) -> f64 {
-    let size = deviation.abs();
-    if size <= HUBER_SIGMAS { 0.5 * size * size } else { HUBER_SIGMAS * (size - 0.5 * HUBER_SIGMAS) }
-}
-
-/// Cost of a step by so many ticks.
-fn step_cost(ticks: i64) -> f64 {
-    match ticks {
-        ..=1 => 0.0,
-        _ => (LOST_COST + FURTHER_LOST_COST * (ticks - 2) as f64).min(PAUSE_COST),
-    }
-}
-
-/// Standard deviation of stamps, in beats: by second differences, of which the middle one has no lost rows.
-fn jitter(t_s: &[f64], period_s: f64) -> f64 {
-    let second = t_s.windows(3).map(|three| (three[2] - 2.0 * three[1] + three[0]).abs() / period_s).collect();
-    // Second differences of independent normal errors have √6 times their standard deviation, gaps √2 times.
-    let of_second = median(second).unwrap_or(0.0) / (0.674_49 * 6_f64.sqrt());
-    of_second.max(MIN_JITTER)
-}
-
-/// The numbers by the likeliest path, and its cost: that of one beat over another one's counts the densities
-/// of lateness in seconds, or the beat by which stamps jitter most were always the likeliest.
-fn likeliest_numbers(t_s: &[f64], period_s: f64) -> (Vec<i64>, f64) {
-    let at = |row: usize| (t_s[row] - t_s[0]) / period_s;
-    let jitter = jitter(t_s, period_s);
-    // The first row may be late itself.
-    let usual = median((0..FIRST_ROWS).map(|row| at(row) - row as f64).collect()).unwrap_or(0.0);
-    let mut rows: Vec<Vec<Path>> = vec![vec![Path { number: 0, cost: 0.0, usual, from: 0 }]];
-    for row in 1..t_s.len() {
-        let mut next: Vec<Path> = Vec::with_capacity(5 * PATHS);
-        for (from, path) in (0_u8..).zip(&rows[row - 1]) {
-            let mut offer = |path: Path| match next.iter_mut().find(|known| known.number == path.number) {
-                Some(known) if path.cost < known.cost => *known = path,
-                Some(_) => {}
-                None => next.push(path),
-            };
-            let due = at(row) - path.usual;
-            for number in [path.number + 1, due.floor() as i64, due.ceil() as i64] {
-                if number > path.number {
-                    let late = at(row) - number as f64 - path.usual;
-                    let cost = path.cost + step_cost(number - path.number) + huber(late / jitter);
-                    let learnt = late.clamp(-2.0 * jitter, 2.0 * jitter) / MEMORY_ROWS.min(row as f64 + 1.0);
-                    offer(Path { number, cost, usual: path.usual + learnt, from });
-                }
-            }
-            // A row that came by itself is of no tick, and as late as it likes.
-            offer(Path { cost: path.cost + BY_ITSELF_COST, from, ..path.to_owned() });
-            // The beat begins anew, as after a pause that is no whole number of ticks.
-            let number = path.number + 1;
-            offer(Path { number, cost: path.cost + PAUSE_COST, usual: at(row) - number as f64, from });
-        }
-        next.sort_by(|a, b| a.cost.total_cmp(&b.cost).then(a.number.cmp(&b.number)));
-        next.truncate(PATHS);
-        rows.push(next);
-    }
-    let mut numbers = vec![0; t_s.len()];
-    let cost = rows.last().and_then(|paths| paths.first()).map_or(f64::INFINITY, |path| path.cost);
-    let mut at = 0;
-    for row in (0..t_s.len()).rev() {
-        let path = rows[row][at];
-        (numbers[row], at) = (path.number, usize::from(path.from));
-    }
-    (numbers, cost + t_s.len() as f64 * (jitter * period_s).ln())
 }
 
 /// Whether no neighbour has a row's number; numbers do not fall.

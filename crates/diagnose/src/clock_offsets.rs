@@ -10,6 +10,7 @@
 use dataset::{Dataset, RunView};
 use estimation::WheelAngleInterpolator;
 use kinematics::{DriveGeometry, Wheels, wrap_to_pi};
+use rayon::prelude::*;
 
 use crate::log_rows::has_outlying_rows;
 use crate::settings::records::{
@@ -49,11 +50,10 @@ pub(crate) fn clock_offsets(datasets: &[Dataset], min_common_s: f64) -> Clocks {
     let mut all = Vec::new();
     for (session, dataset) in datasets.iter().enumerate() {
         let Ok(geometry) = dataset.robot.geometry() else { return Clocks::default() };
-        let view = dataset.session();
-        for (position, run) in view.runs.iter().enumerate() {
-            let profile = Profile::of(run, dataset, &geometry);
-            all.extend(profile.map(|profile| OfRun { run: (session, position), profile }));
-        }
+        let of_run = |(position, run): (usize, &RunView<'_>)| {
+            Some(OfRun { run: (session, position), profile: Profile::of(run, dataset, &geometry)? })
+        };
+        all.par_extend(dataset.session().runs.par_iter().enumerate().filter_map(of_run));
     }
     let Some(common_s) = common_offset_s(&all) else { return Clocks::default() };
     let id = |(session, position): (usize, usize)| datasets[session].runs[position].info.id.clone();

@@ -5,6 +5,7 @@ use calib::{CalibError, Calibration, CalibrationReport, MethodReport, Names};
 use dataset::Dataset;
 use effects::CATALOGUE;
 use estimation::{EstimationError, FitSettings, ModelFit};
+use rayon::prelude::*;
 use scenario::Scenario;
 
 use crate::alternatives::{Alternative, alternatives};
@@ -164,6 +165,10 @@ fn stages(
 ) -> Result<Diagnosis, DiagnoseError> {
     let begins = |step| options.on_stage.begins(step);
     begins(Step::Motions);
+    // Each run's, at once: all that asks for them later asks run by run.
+    datasets.par_iter().flat_map(|dataset| &dataset.runs).for_each(|run| {
+        let _ = run.odometry.t_s.sampling_period();
+    });
     let every_term = mean_terms(&options.without);
     // Stamps that counts show to be wrong by themselves: all else is sought in records that are restamped.
     let by_counts = stamp_error_by_counts(datasets, &every_term);

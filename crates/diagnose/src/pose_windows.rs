@@ -11,6 +11,7 @@ use dataset::{Dataset, TruthSample};
 use estimation::WheelAngleInterpolator;
 use kinematics::{Increment, Pose, Wheels, wrap_to_pi};
 use nalgebra::{Matrix2, Matrix3, Matrix3x4, Matrix4, Vector2, Vector3, Vector4};
+use rayon::prelude::*;
 
 use crate::clock_offsets::turns_at;
 use crate::log_rows::has_outlying_rows;
@@ -39,9 +40,9 @@ impl PoseTrack {
     pub(crate) fn of_all(datasets: &[Dataset], late_s: f64) -> Vec<Self> {
         let mut tracks = Vec::new();
         for (session, dataset) in datasets.iter().enumerate() {
-            for (position, run) in dataset.session().runs.iter().enumerate() {
-                tracks.extend(Self::of(run, dataset, (session, position), late_s));
-            }
+            let of_run =
+                |(position, run): (usize, &dataset::RunView<'_>)| Self::of(run, dataset, (session, position), late_s);
+            tracks.par_extend(dataset.session().runs.par_iter().enumerate().filter_map(of_run));
         }
         tracks
     }

@@ -9,6 +9,7 @@ use std::borrow::Cow;
 use dataset::{Dataset, Session};
 use effects::{CATALOGUE, Hypothesis, RecordCorrection, hypothesis};
 use estimation::{Column, FitSettings, ModelFit, NoiseComponent};
+use rayon::prelude::*;
 
 use crate::augmented_model::{cost, count};
 use crate::candidate::{Candidate, terms};
@@ -56,63 +57,81 @@ pub(crate) fn fault(
     outlying: bool,
 ) -> Option<Fault> {
     let sound = base.is_some_and(is_sound);
-    let uncorrelated = base.is_some_and(|base| !is_correlated(base, &[]));
+    // The most specific trace first: jumps that are undone at once are also wraps.
+    let sought: Vec<&'static str> = CATALOGUE
+        .iter()
+        .rev()
+        .filter(|id| !without.iter().any(|out| out == *id))
+        // What leaves no trace is possible in any records; it is tried where the base fit is implausible.
+        .filter(|id| !sound || effects::description(id).is_none_or(|of| of.record_fault.leaves_a_trace))
+        .copied()
+        .collect();
+    let of_effect = |id: &&'static str| match hypothesis(id) {
+        Some(Hypothesis::Records(corrections)) => explained_by(id, corrections, datasets, base, outlying),
+        _ => Vec::new(),
+    };
+    let explained: Vec<Vec<(bool, Fault)>> = sought.par_iter().map(of_effect).collect();
     let mut best: Option<(bool, Fault)> = None;
     let mut tried: Vec<(&'static str, bool, f64)> = Vec::new();
-    // The most specific trace first: jumps that are undone at once are also wraps.
-    for id in CATALOGUE.iter().rev().filter(|id| !without.iter().any(|out| out == *id)) {
-        let Some(Hypothesis::Records(corrections)) = hypothesis(id) else { continue };
-        // What leaves no trace is possible in any records; it is tried where the base fit is implausible.
-        if sound && effects::description(id).is_some_and(|description| !description.record_fault.leaves_a_trace) {
-            continue;
-        }
-        for Form { values, sentence, visible_in_log, mistakes, records } in batched(datasets, corrections) {
-            if outlying && !visible_in_log {
-                continue;
-            }
-            // By all measurements of the records: those that are not compared later count here.
-            let compared = with_unknown_motion_of(datasets, &records);
-            let Ok(fit) = PLAIN.fit_to_compare(&sessions(&compared)) else { continue };
-            // Records that no plausible drive follows, rewritten or not, say nothing of the fault, unless
-            // they show it by themselves. What was lost is not restored to the last count: measurements may
-            // still lie off, but far fewer of them.
-            let most_outliers = base.map_or(MAX_CORRECTED_OUTLIER_FRACTION, |base| {
-                MAX_CORRECTED_OUTLIER_FRACTION.max(MAX_REMAINING_OUTLIER_RATIO * rejected_share(base))
-            });
-            let is_plausible = (is_drive(&fit) || base.is_some_and(|base| is_far_more_of_a_drive(&fit, base)))
-                && is_correlated(&fit, &[])
-                && rejected_share(&fit) < most_outliers
-                && fit.solution.model.body_from_sensor.theta_rad.abs() <= MAX_SENSOR_HEADING_RAD;
-            if !is_plausible && !visible_in_log {
-                continue;
-            }
-            let gain = base.map_or(f64::MAX, |base| {
-                // Measurements that only one of the fits explains are charged as outliers to the other.
-                let measurements = count(base).max(count(&fit));
-                cost(base, measurements) + implausible(base) - cost(&fit, measurements) - implausible(&fit)
-            });
-            let gain = gain - f64::from(mistakes - 1) * LOG_ODDS_OF_A_MISTAKE;
-            // What the log shows needs no instrument; one must not contradict it, where it has anything to
-            // say.
-            let min_gain = match visible_in_log {
-                true if uncorrelated => f64::NEG_INFINITY,
-                true => -MIN_FAULT_LOG_LIKELIHOOD_GAIN,
-                false => MIN_FAULT_LOG_LIKELIHOOD_GAIN,
-            };
-            let better = |(known_visible, known): &(bool, Fault)| {
-                (visible_in_log, gain) > (*known_visible, known.gain + f64::from(u8::from(*known_visible)))
-            };
-            if gain <= min_gain {
-                continue;
-            }
-            tried.push((id, visible_in_log, gain));
-            if best.as_ref().is_none_or(better) {
-                let gain = gain.max(MIN_FAULT_LOG_LIKELIHOOD_GAIN);
-                best = Some((visible_in_log, Fault { id, rivals: Vec::new(), values, sentence, records, gain }));
-            }
+    for (visible_in_log, fault) in explained.into_iter().flatten() {
+        let better = |(known_visible, known): &(bool, Fault)| {
+            (visible_in_log, fault.gain) > (*known_visible, known.gain + f64::from(u8::from(*known_visible)))
+        };
+        tried.push((fault.id, visible_in_log, fault.gain));
+        if best.as_ref().is_none_or(better) {
+            let gain = fault.gain.max(MIN_FAULT_LOG_LIKELIHOOD_GAIN);
+            best = Some((visible_in_log, Fault { gain, ..fault }));
         }
     }
     best.map(|(visible, fault)| Fault { rivals: rivals(&tried, visible, &fault), ..fault })
+}
+
+/// The forms of a fault that explain the records, each with whether the log shows it by itself.
+fn explained_by(
+    id: &'static str,
+    corrections: fn(&Dataset) -> Vec<RecordCorrection>,
+    datasets: &[Dataset],
+    base: Option<&ModelFit<'_>>,
+    outlying: bool,
+) -> Vec<(bool, Fault)> {
+    let uncorrelated = base.is_some_and(|base| !is_correlated(base, &[]));
+    let explains = |Form { values, sentence, visible_in_log, mistakes, records }: Form| {
+        if outlying && !visible_in_log {
+            return None;
+        }
+        // By all measurements of the records: those that are not compared later count here.
+        let compared = with_unknown_motion_of(datasets, &records);
+        let fit = PLAIN.fit_to_compare(&sessions(&compared)).ok()?;
+        // Records that no plausible drive follows, rewritten or not, say nothing of the fault, unless they
+        // show it by themselves. What was lost is not restored to the last count: measurements may still lie
+        // off, but far fewer of them.
+        let most_outliers = base.map_or(MAX_CORRECTED_OUTLIER_FRACTION, |base| {
+            MAX_CORRECTED_OUTLIER_FRACTION.max(MAX_REMAINING_OUTLIER_RATIO * rejected_share(base))
+        });
+        let is_plausible = (is_drive(&fit) || base.is_some_and(|base| is_far_more_of_a_drive(&fit, base)))
+            && is_correlated(&fit, &[])
+            && rejected_share(&fit) < most_outliers
+            && fit.solution.model.body_from_sensor.theta_rad.abs() <= MAX_SENSOR_HEADING_RAD;
+        if !is_plausible && !visible_in_log {
+            return None;
+        }
+        let gain = base.map_or(f64::MAX, |base| {
+            // Measurements that only one of the fits explains are charged as outliers to the other.
+            let measurements = count(base).max(count(&fit));
+            cost(base, measurements) + implausible(base) - cost(&fit, measurements) - implausible(&fit)
+        });
+        let gain = gain - f64::from(mistakes - 1) * LOG_ODDS_OF_A_MISTAKE;
+        // What the log shows needs no instrument; one must not contradict it, where it has anything to say.
+        let min_gain = match visible_in_log {
+            true if uncorrelated => f64::NEG_INFINITY,
+            true => -MIN_FAULT_LOG_LIKELIHOOD_GAIN,
+            false => MIN_FAULT_LOG_LIKELIHOOD_GAIN,
+        };
+        drop(fit);
+        drop(compared);
+        (gain > min_gain).then_some((visible_in_log, Fault { id, rivals: Vec::new(), values, sentence, records, gain }))
+    };
+    batched(datasets, corrections).into_iter().filter_map(explains).collect()
 }
 
 /// The faults that undo as much as the best one, each with its log odds against that. What the log shows by
@@ -251,7 +270,7 @@ fn is_same(a: &[(&'static str, f64)], b: &[(&'static str, f64)]) -> bool {
 
 /// The same rewriting of all sessions; a session in which it is impossible stays as it is.
 fn batched(datasets: &[Dataset], corrections: fn(&Dataset) -> Vec<RecordCorrection>) -> Vec<Form> {
-    let each: Vec<Vec<RecordCorrection>> = datasets.iter().map(corrections).collect();
+    let each: Vec<Vec<RecordCorrection>> = datasets.par_iter().map(corrections).collect();
     let mut forms: Vec<Form> = Vec::new();
     for correction in each.iter().flatten() {
         match forms.iter_mut().find(|form| is_same(&form.values, &correction.values)) {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use kinematics::{Pose, wrap_to_pi};
 use model_term::ModelTerm;
+use rayon::prelude::*;
 
 use crate::decimation::Decimated;
 use crate::error::EstimationError;
@@ -197,43 +198,59 @@ impl ModelFit<'_> {
         model: &Model,
         terms: &mut [Box<dyn ModelTerm>],
         selected: impl Fn((usize, usize)) -> bool,
-        measurements: impl Fn(&'b Segment<'b>) -> &'b [MeasuredPose],
+        measurements: impl Fn(&'b Segment<'b>) -> &'b [MeasuredPose] + Sync,
     ) -> Vec<EndError> {
-        let mut found = Vec::new();
-        // The state at the end of the displacements so far.
-        let mut carried: Option<CarriedState> = None;
-        for segment in self.records.segments.iter().filter(|segment| selected(segment.run)) {
-            let Some((start, first, _)) = segment.ends() else { continue };
-            let Instrument { body_from_sensor, latency_s } = model.instrument(segment.run);
-            let mut propagator = Propagator::new(segment, model, terms);
-            if let Some(carried) = carried.take().filter(|_| segment.continues) {
-                propagator.carry_on(carried);
-            }
-            propagator.restart();
-            // Where the drive's centre stands at the first measurement, to first order in what the terms add
-            // to it.
-            let mounted = start * body_from_sensor.inverse();
-            let off = propagator.measurement_offset(mounted, first.0, first.1, latency_s);
-            let mut pose = mounted * off.inverse();
-            let (start_m, mut at) = (propagator.session_m(), first.1);
-            for measurement in measurements(segment) {
-                pose = propagator.dead_reckon(pose, at..measurement.after);
-                at = measurement.after;
-                let Some(theta_rad) = measurement.theta_rad else { continue };
-                let off = propagator.measurement_offset(pose, measurement.t_s, at, latency_s);
-                let measured = pose * off * body_from_sensor;
-                let there = Pose::new(measurement.x_m, measurement.y_m, theta_rad);
-                let off_rad = wrap_to_pi(measured.theta_rad - theta_rad);
-                found.push(EndError {
-                    run: segment.run,
-                    position_m: measured.position().distance_m(there.position()),
-                    heading_rad: off_rad.abs(),
-                    length_m: propagator.session_m() - start_m,
-                    off: Pose { theta_rad: off_rad, ..there.to(measured) },
-                });
-            }
-            carried = Some(propagator.carried(pose * body_from_sensor));
-        }
-        found
+        let of_run = |terms: &mut Vec<Box<dyn ModelTerm>>, run: &'b [Segment<'b>]| {
+            dead_reckoned_run(run, model, terms, &measurements)
+        };
+        let runs = self.records.segments.chunk_by(|a, b| a.run == b.run).filter(|run| selected(run[0].run));
+        let found: Vec<Vec<EndError>> =
+            runs.collect::<Vec<_>>().into_par_iter().map_init(|| terms.to_vec(), of_run).collect();
+        found.into_iter().flatten().collect()
     }
+}
+
+/// Dead reckoning of the segments of a run, each from its first measurement to those that are asked for.
+fn dead_reckoned_run<'b>(
+    run: &'b [Segment<'b>],
+    model: &Model,
+    terms: &mut [Box<dyn ModelTerm>],
+    measurements: &impl Fn(&'b Segment<'b>) -> &'b [MeasuredPose],
+) -> Vec<EndError> {
+    let mut found = Vec::new();
+    // The state at the end of the displacements so far.
+    let mut carried: Option<CarriedState> = None;
+    for segment in run {
+        let Some((start, first, _)) = segment.ends() else { continue };
+        let Instrument { body_from_sensor, latency_s } = model.instrument(segment.run);
+        let mut propagator = Propagator::new(segment, model, terms);
+        if let Some(carried) = carried.take().filter(|_| segment.continues) {
+            propagator.carry_on(carried);
+        }
+        propagator.restart();
+        // Where the drive's centre stands at the first measurement, to first order in what the terms add
+        // to it.
+        let mounted = start * body_from_sensor.inverse();
+        let off = propagator.measurement_offset(mounted, first.0, first.1, latency_s);
+        let mut pose = mounted * off.inverse();
+        let (start_m, mut at) = (propagator.session_m(), first.1);
+        for measurement in measurements(segment) {
+            pose = propagator.dead_reckon(pose, at..measurement.after);
+            at = measurement.after;
+            let Some(theta_rad) = measurement.theta_rad else { continue };
+            let off = propagator.measurement_offset(pose, measurement.t_s, at, latency_s);
+            let measured = pose * off * body_from_sensor;
+            let there = Pose::new(measurement.x_m, measurement.y_m, theta_rad);
+            let off_rad = wrap_to_pi(measured.theta_rad - theta_rad);
+            found.push(EndError {
+                run: segment.run,
+                position_m: measured.position().distance_m(there.position()),
+                heading_rad: off_rad.abs(),
+                length_m: propagator.session_m() - start_m,
+                off: Pose { theta_rad: off_rad, ..there.to(measured) },
+            });
+        }
+        carried = Some(propagator.carried(pose * body_from_sensor));
+    }
+    found
 }

@@ -13,6 +13,7 @@ use std::sync::Arc;
 use kinematics::{Side, Wheels};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use rayon::prelude::*;
 
 use crate::model_fit::ModelFit;
 use crate::segment::Segment;
@@ -34,10 +35,11 @@ impl ModelFit<'_> {
         if runs.is_empty() {
             return None;
         }
-        for (number, segments) in runs.into_values().enumerate() {
+        let of_run = |(number, segments): (usize, Vec<&mut Segment<'_>>)| {
             let noise = RateNoise::of(&segments, Xoshiro256PlusPlus::seed_from_u64(number as u64));
             segments.into_iter().flat_map(|segment| &mut segment.intervals).for_each(|interval| noise.add_to(interval));
-        }
+        };
+        runs.into_values().collect::<Vec<_>>().into_par_iter().enumerate().for_each(of_run);
         Some(Self { records: Arc::new(records), ..self.clone() })
     }
 }

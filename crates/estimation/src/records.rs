@@ -7,8 +7,9 @@
 
 use std::cell::LazyCell;
 
-use dataset::{CovarianceScale, MapDistortion, Run, Session, TruthSample};
+use dataset::{CovarianceScale, MapDistortion, Run, RunView, Session, TruthSample};
 use kinematics::{Increment, Pose};
+use rayon::prelude::*;
 
 use crate::model::Model;
 use crate::noise::NoisePrior;
@@ -55,46 +56,40 @@ impl<'a> Records<'a> {
         records.map = sessions.iter().find_map(|session| session.truth_noise.map);
         let nominal = sessions.first().and_then(|session| Some(Model::of(&session.robot.geometry().ok()?, 0)));
         for (number, session) in sessions.iter().enumerate() {
-            let mut session_m = 0.0;
             // Its noise is sought in all rows of the session.
             let gyro = LazyCell::new(|| GyroSettings::of(session));
             records.ids.push(session.runs.iter().map(|run| run.info().id.clone()).collect());
-            for (position, run) in session.runs.iter().enumerate() {
+            let track_of = |run: &RunView<'a>| WheelAngleInterpolator::of(run, session.robot);
+            let tracks: Vec<_> = session.runs.par_iter().map(track_of).collect();
+            let (mut session_m, mut bases) = (0.0, Vec::with_capacity(tracks.len()));
+            for (position, (run, track)) in session.runs.iter().zip(&tracks).enumerate() {
                 session_m = run.run().session_m.unwrap_or(session_m);
-                let before = records.segments.len();
-                let mut has_partial = false;
-                if let Some(track) = WheelAngleInterpolator::of(run, session.robot) {
-                    let base = Segment {
-                        run: (number, position),
-                        info: run.info(),
-                        start: Start::MeasuredPose,
-                        continues: false,
-                        intervals: Vec::new(),
-                        measurements: Vec::new(),
-                        wheel_rad: track.first_rad(),
-                        quantum_rad: track.quantum_rad(),
-                        rate_window: track.rate_window(),
-                        session_m,
-                    };
-                    add_poses(&mut records.segments, &base, &track, run.run(), measured_poses(run, reference));
-                    if let Some(nominal) = &nominal {
-                        let rows_s = &run.odometry().t_s;
-                        for poses in &mut records.segments[before..] {
-                            take_one_for_each_row(poses, rows_s, nominal, reference);
-                            take_those_near_rows(poses, nominal, reference);
-                        }
-                    }
-                    add_displacements(&mut records.segments, &base, &track, run.run());
-                    if let Some(nominal) = &nominal {
-                        let poses = (&records.segments[before..], before);
-                        let partial =
-                            partial_segments(run, &base, poses, &track, nominal, (&gyro, session.truth_noise.lidar));
-                        has_partial = !partial.is_empty();
-                        records.partial.extend(partial);
-                    }
-                    session_m += track.distance_m(session.robot);
+                bases.push(track.as_ref().map(|track| (base((number, position), run, track, session_m), track)));
+                session_m += track.as_ref().map_or(0.0, |track| track.distance_m(session.robot));
+            }
+            let of_run = |(run, base): (&RunView<'a>, &Option<(Segment<'a>, &WheelAngleInterpolator)>)| {
+                let mut segments = Vec::new();
+                let Some((base, track)) = base else { return segments };
+                add_poses(&mut segments, base, track, run.run(), measured_poses(run, reference));
+                for poses in &mut segments {
+                    let Some(nominal) = &nominal else { continue };
+                    take_one_for_each_row(poses, &run.odometry().t_s, nominal, reference);
+                    take_those_near_rows(poses, nominal, reference);
                 }
-                if records.segments.len() == before && !has_partial {
+                add_displacements(&mut segments, base, track, run.run());
+                segments
+            };
+            let segments: Vec<Vec<Segment<'a>>> = session.runs.par_iter().zip(&bases).map(of_run).collect();
+            for (position, ((run, base), segments)) in session.runs.iter().zip(&bases).zip(segments).enumerate() {
+                let (before, partial_before) = (records.segments.len(), records.partial.len());
+                records.segments.extend(segments);
+                if let (Some((base, track)), Some(nominal)) = (base, &nominal) {
+                    let poses = (&records.segments[before..], before);
+                    let lidar = session.truth_noise.lidar;
+                    let partial = partial_segments(run, base, poses, track, nominal, (&gyro, lidar));
+                    records.partial.extend(partial);
+                }
+                if (records.segments.len(), records.partial.len()) == (before, partial_before) {
                     records.unused.push((number, position));
                 }
             }
@@ -302,7 +297,7 @@ fn has_common_scale(session: &Session<'_>) -> bool {
 }
 
 /// What the instrument measured in a run; intervals are not counted yet.
-fn measured_poses(run: &dataset::RunView<'_>, reference: [f64; 2]) -> Vec<MeasuredPose> {
+fn measured_poses(run: &RunView<'_>, reference: [f64; 2]) -> Vec<MeasuredPose> {
     let Run { truth, truth_sigma, .. } = run.run();
     if truth.is_empty() {
         let poses = run.observed_poses().into_iter();
@@ -341,6 +336,27 @@ fn measured_poses(run: &dataset::RunView<'_>, reference: [f64; 2]) -> Vec<Measur
         }
     };
     truth.iter().enumerate().map(of).collect()
+}
+
+/// A segment of a run without intervals and measurements.
+fn base<'a>(
+    run: (usize, usize),
+    view: &RunView<'a>,
+    track: &WheelAngleInterpolator<'_>,
+    session_m: f64,
+) -> Segment<'a> {
+    Segment {
+        run,
+        info: view.info(),
+        start: Start::MeasuredPose,
+        continues: false,
+        intervals: Vec::new(),
+        measurements: Vec::new(),
+        wheel_rad: track.first_rad(),
+        quantum_rad: track.quantum_rad(),
+        rate_window: track.rate_window(),
+        session_m,
+    }
 }
 
 fn add_poses<'a>(

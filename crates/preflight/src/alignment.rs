@@ -1,6 +1,7 @@
 //! How well the wheels explain what the instrument saw, for a reading of its records and a clock.
 
 use kinematics::Wheels;
+use rayon::prelude::*;
 
 use crate::regression::regress;
 use crate::run_log::RunLog;
@@ -145,9 +146,12 @@ impl Comparison<'_> {
         let (mut from_s, mut to_s) = (low_s, high_s);
         for step_s in CLOCK_STEPS_S {
             let count = ((to_s - from_s) / step_s).ceil() as usize;
-            for k in 0..=count {
+            let at = |k: usize| {
                 let offset_s = from_s + step_s * k as f64;
-                let Some(found) = self.at(Clock { offset_s, rate: 0.0 }) else { continue };
+                Some((offset_s, self.at(Clock { offset_s, rate: 0.0 })?))
+            };
+            let all: Vec<_> = (0..=count).into_par_iter().map(at).collect();
+            for (offset_s, found) in all.into_iter().flatten() {
                 if best.is_none_or(|(_, best)| found.cost < best.cost) {
                     best = Some((offset_s, found));
                 }
@@ -189,26 +193,29 @@ impl Comparison<'_> {
         let [most, step] = CLOCK_RATES;
         let middle_s = 0.5 * self.windows.iter().map(|window| window.to_s.abs()).fold(0.0, f64::max);
         let mut best: Option<(Clock, Explained)> = None;
-        let consider = |clock: Clock, best: &mut Option<(Clock, Explained)>| {
-            let Some(found) = self.at(clock) else { return };
+        let consider = |clock: Clock, found: Option<Explained>, best: &mut Option<(Clock, Explained)>| {
+            let Some(found) = found else { return };
             if best.is_none_or(|(_, best)| found.cost < best.cost) {
                 *best = Some((clock, found));
             }
         };
         let count = (most / step).round() as i32;
-        for k in -count..=count {
+        let of_rate = |k: i32| {
             let rate = step * f64::from(k);
-            for offset_s in [0.0, near.offset_s, near.offset_s - rate * middle_s] {
-                consider(Clock { offset_s, rate }, &mut best);
-            }
-        }
+            [0.0, near.offset_s, near.offset_s - rate * middle_s].map(|offset_s| Clock { offset_s, rate })
+        };
+        let grid: Vec<Clock> = (-count..=count).flat_map(of_rate).collect();
+        let all: Vec<_> = grid.into_par_iter().map(|clock| (clock, self.at(clock))).collect();
+        all.into_iter().for_each(|(clock, found)| consider(clock, found, &mut best));
         let (mut step, mut step_s) = (0.5 * step, CLOCK_STEPS_S[1]);
         for _ in 0..6 {
             for _ in 0..2 {
                 for by in [-2.0, -1.0, 1.0, 2.0] {
                     let (at, _) = best?;
-                    consider(Clock { rate: at.rate + by * step, ..at }, &mut best);
-                    consider(Clock { offset_s: at.offset_s + by * step_s, ..at }, &mut best);
+                    let beside = Clock { rate: at.rate + by * step, ..at };
+                    consider(beside, self.at(beside), &mut best);
+                    let beside = Clock { offset_s: at.offset_s + by * step_s, ..at };
+                    consider(beside, self.at(beside), &mut best);
                 }
             }
             (step, step_s) = (0.4 * step, 0.4 * step_s);

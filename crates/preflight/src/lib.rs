@@ -23,6 +23,7 @@ mod windows;
 use std::collections::BTreeMap;
 
 use dataset::Dataset;
+use rayon::prelude::*;
 
 pub use problem::{Problem, Severity};
 pub use problems::remedies::{Remedy, WouldDetermine};
@@ -50,7 +51,7 @@ impl Preflight {
 /// Checks one robot's sessions.
 #[must_use]
 pub fn check(datasets: &[Dataset]) -> Preflight {
-    let sessions: Vec<SessionCheck> = datasets.iter().map(stages::checked).collect();
+    let sessions: Vec<SessionCheck> = datasets.par_iter().map(stages::checked).collect();
     let mut problems: Vec<Problem> = problems::several_robots::found(&sessions).into_iter().collect();
     for session in &sessions {
         for problem in &session.problems {

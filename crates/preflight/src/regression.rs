@@ -64,7 +64,7 @@ impl Moments {
 pub(crate) fn regress(pairs: &[(Wheels<f64>, f64)], passes: usize) -> Option<Regression> {
     let mut weights = vec![1.0; pairs.len()];
     let mut found = None;
-    for _ in 0..passes {
+    for pass in 0..passes {
         let weighted = || pairs.iter().zip(&weights);
         let inverse = Moments::of(weighted().map(|((turn, _), weight)| (*turn, *weight))).inverse()?;
         let (mut left, mut right) = (0.0, 0.0);
@@ -84,9 +84,8 @@ pub(crate) fn regress(pairs: &[(Wheels<f64>, f64)], passes: usize) -> Option<Reg
         let whole = pairs.iter().map(|(_, outcome)| outcome.abs()).sum::<f64>() / pairs.len() as f64;
         let sigma = Wheels { left: (var * inverse.ll).sqrt(), right: (var * inverse.rr).sqrt() };
         found = Some(Regression { per_rad, sigma, left: mean, whole });
-        if passes > 1 {
-            sizes.sort_by(f64::total_cmp);
-            let scale = CAUCHY_MEDIANS * sizes[sizes.len() / 2] + f64::MIN_POSITIVE;
+        if pass + 1 < passes {
+            let scale = CAUCHY_MEDIANS * upper_median(&mut sizes)? + f64::MIN_POSITIVE;
             for (weight, pair) in weights.iter_mut().zip(pairs) {
                 *weight = 1.0 / (1.0 + (residual(pair) / scale).powi(2));
             }
@@ -105,7 +104,7 @@ pub(crate) fn robustly(pairs: &[(Wheels<f64>, f64)]) -> Option<Regression> {
 pub(crate) fn slope(pairs: &[(f64, f64)]) -> Option<(f64, f64, f64, f64)> {
     let mut weights = vec![1.0; pairs.len()];
     let mut found = None;
-    for _ in 0..ROBUST_PASSES {
+    for pass in 0..ROBUST_PASSES {
         let sums = pairs
             .iter()
             .zip(&weights)
@@ -121,13 +120,20 @@ pub(crate) fn slope(pairs: &[(f64, f64)]) -> Option<(f64, f64, f64, f64)> {
         let var = square / (weights.iter().sum::<f64>() - 1.0).max(1.0);
         let whole = pairs.iter().map(|(_, y)| y.abs()).sum::<f64>() / pairs.len() as f64;
         found = Some((slope, (var / sums.0).sqrt(), left, whole));
-        sizes.sort_by(f64::total_cmp);
-        let scale = CAUCHY_MEDIANS * sizes[sizes.len() / 2] + f64::MIN_POSITIVE;
-        for (weight, pair) in weights.iter_mut().zip(pairs) {
-            *weight = 1.0 / (1.0 + (residual(pair) / scale).powi(2));
+        if pass + 1 < ROBUST_PASSES {
+            let scale = CAUCHY_MEDIANS * upper_median(&mut sizes)? + f64::MIN_POSITIVE;
+            for (weight, pair) in weights.iter_mut().zip(pairs) {
+                *weight = 1.0 / (1.0 + (residual(pair) / scale).powi(2));
+            }
         }
     }
     found
+}
+
+/// The middle of some values, the upper one of an even number; `None` of none. Puts them in another order.
+fn upper_median(values: &mut [f64]) -> Option<f64> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 #[cfg(test)]

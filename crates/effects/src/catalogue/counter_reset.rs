@@ -19,7 +19,7 @@ use crate::benchmark::Benchmark;
 use crate::description::{Description, RecordFault};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
-use crate::hypothesis::{Hypothesis, RecordCorrection, median, value_of};
+use crate::hypothesis::{Hypothesis, RecordCorrection, median_of_few, value_of};
 use crate::on_board::OnBoard;
 use crate::stream::Stream;
 
@@ -136,17 +136,23 @@ impl<'c> Rates<'c> {
     /// may set off there, and a reset is one of them.
     fn may_count(&self, row: usize) -> f64 {
         let near = row.saturating_sub(NEIGHBOUR_ROWS)..(row + NEIGHBOUR_ROWS + 1).min(self.increments.len());
-        let mut sizes: Vec<f64> = near.map(|k| self.increments[k].abs()).collect();
-        sizes.sort_by(f64::total_cmp);
-        far(sizes.len().checked_sub(3).map_or(0.0, |third| sizes[third]))
+        let mut largest = [0.0_f64; 3];
+        for size in near.map(|k| self.increments[k].abs()) {
+            let place = largest.partition_point(|larger| *larger >= size);
+            if place < largest.len() {
+                largest[place..].rotate_right(1);
+                largest[place] = size;
+            }
+        }
+        far(largest[2])
     }
 
     /// What the wheel counts from a row to a later one, by the increments around the first.
     fn due(&self, from: usize, to: usize) -> f64 {
         let near = from.saturating_sub(NEIGHBOUR_ROWS)..(from + NEIGHBOUR_ROWS + 1).min(self.increments.len());
         let rates = near.filter(|k| self.t_s[k + 1] > self.t_s[*k]);
-        let rates = rates.map(|k| self.increments[k] / (self.t_s[k + 1] - self.t_s[k])).collect();
-        median(rates).unwrap_or(0.0) * (self.t_s[to] - self.t_s[from])
+        let rates = rates.map(|k| self.increments[k] / (self.t_s[k + 1] - self.t_s[k]));
+        median_of_few::<{ 2 * NEIGHBOUR_ROWS + 1 }>(rates).unwrap_or(0.0) * (self.t_s[to] - self.t_s[from])
     }
 }
 
@@ -185,20 +191,28 @@ fn fill_zero_rows(t_s: &[f64], ticks: &mut [i64]) -> usize {
     restored
 }
 
+/// What the wheel counts up to a row at which its counter begins again at zero; `None` of another row.
+fn reset_of(shown: &[i64], rates: &Rates<'_>, row: usize) -> Option<f64> {
+    let [before, now] = [row - 1, row].map(|row| (shown[row] as f64).abs());
+    // Near zero, from far off. It goes on from there, and does not come back.
+    let most = if now < before { rates.may_count(row - 1) } else { return None };
+    let goes_on = rates.increments.get(row).is_some_and(|next| next.abs() <= most);
+    if now > most || before <= most || !goes_on {
+        return None;
+    }
+    let due = rates.due(row - 1, row);
+    let off = (rates.increments[row - 1] - due).abs();
+    let wraps = |bits: &u32| (off - 2_f64.powi(*bits as i32)).abs() <= 2.0 * due.abs() + FAR_COUNTS;
+    (off > most && !WRAP_BITS.iter().any(wraps)).then_some(due)
+}
+
 /// Carries the counts on where they begin again at zero, and says how often they did.
 fn carry_on(t_s: &[f64], ticks: &mut [i64]) -> usize {
     let rates = Rates::of(t_s, ticks);
     let (mut carried, mut resets) = (0_i64, 0);
     let shown = ticks.to_vec();
     for row in 1..shown.len() {
-        let due = rates.due(row - 1, row);
-        let off = rates.increments[row - 1] - due;
-        let wraps = |bits: &u32| (off.abs() - 2_f64.powi(*bits as i32)).abs() <= 2.0 * due.abs() + FAR_COUNTS;
-        // It goes on from there, and does not come back.
-        let most = rates.may_count(row - 1);
-        let goes_on = rates.increments.get(row).is_some_and(|next| next.abs() <= most);
-        let is_near_zero = (shown[row] as f64).abs() <= most && (shown[row - 1] as f64).abs() > most;
-        if is_near_zero && off.abs() > most && goes_on && !WRAP_BITS.iter().any(wraps) {
+        if let Some(due) = reset_of(&shown, &rates, row) {
             carried += shown[row - 1] + due.round() as i64 - shown[row];
             resets += 1;
         }

@@ -17,7 +17,7 @@ use crate::benchmark::Benchmark;
 use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
-use crate::hypothesis::{Hypothesis, RecordCorrection, median, value_of};
+use crate::hypothesis::{Hypothesis, RecordCorrection, median, median_of_few, value_of};
 use crate::on_board::OnBoard;
 use crate::stream::Stream;
 
@@ -107,7 +107,8 @@ fn mend(t_s: &[f64], ticks: &mut [i64], jump: i64) -> Restored {
     let last = ticks.len().saturating_sub(1);
     let out_of_line = |k: usize| {
         let near = k.saturating_sub(NEIGHBOUR_ROWS)..(k + NEIGHBOUR_ROWS + 1).min(last);
-        let rate = median(near.map(|near| increment(near) / (t_s[near + 1] - t_s[near])).collect()).unwrap_or(0.0);
+        let rates = near.map(|near| increment(near) / (t_s[near + 1] - t_s[near]));
+        let rate = median_of_few::<{ 2 * NEIGHBOUR_ROWS + 1 }>(rates).unwrap_or(0.0);
         increment(k) - rate * (t_s[k + 1] - t_s[k])
     };
     let all: Vec<f64> = (0..last).map(out_of_line).collect();
