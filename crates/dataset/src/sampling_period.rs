@@ -29,6 +29,9 @@ const PHASE_SPANS: [(usize, [f64; 2], u32); 4] =
 const SPANS: usize = 8;
 /// Spans of which phases are taken.
 const PHASES_TAKEN: usize = 1000;
+/// Ticks that two beats which number the rows of a log alike are apart at its end: far below the jitter of any
+/// log that is not exact.
+const SAME_BEAT_TICKS: f64 = 0.01;
 /// Where stamps are later than that share of the beat, root mean square, some numbers of rows are wrong.
 const MAX_CERTAIN_LATENESS: f64 = 0.25;
 /// Share of the beat that stamps jitter by, up to which a row that came by itself is told from a late one: by
@@ -68,7 +71,10 @@ impl SamplingPeriod {
         let Numbered { period_s, numbers, .. } = match Numbered::by(t_s, gap_s) {
             Some(exact) if exact.cost == f64::NEG_INFINITY => exact,
             of_gap => {
-                let others = first_periods(t_s)?.into_iter().filter_map(|first_s| Numbered::by(t_s, first_s));
+                let [mean_s, phases_s] = first_periods(t_s)?;
+                let first = [Some(mean_s), (!is_same_beat(phases_s, mean_s, t_s)).then_some(phases_s)];
+                let others = first.into_iter().flatten().filter(|first_s| !is_same_beat(*first_s, gap_s, t_s));
+                let others = others.filter_map(|first_s| Numbered::by(t_s, first_s));
                 let found = of_gap.into_iter().chain(others).min_by(|a, b| a.cost.total_cmp(&b.cost))?;
                 found.settled(t_s)
             }
@@ -139,8 +145,15 @@ fn period(t_s: &[f64], numbers: &[i64]) -> Option<f64> {
     median(all).filter(|period_s| *period_s > 0.0)
 }
 
+/// Whether two beats are hardly apart at the end of a log: they number its rows alike.
+fn is_same_beat(a_s: f64, b_s: f64, t_s: &[f64]) -> bool {
+    (a_s / b_s - 1.0).abs() * t_s.len() as f64 <= SAME_BEAT_TICKS
+}
+
 /// Rows with their numbers by some beat.
 struct Numbered {
+    /// The beat that they were found by.
+    first_s: f64,
     period_s: f64,
     numbers: Vec<i64>,
     /// Negative log likelihood; −∞ where every gap is a whole number of beats.
@@ -155,13 +168,16 @@ impl Numbered {
         }
         let whole = whole_gaps(t_s, first_s).map(|numbers| (numbers, f64::NEG_INFINITY));
         let (numbers, cost) = whole.unwrap_or_else(|| likeliest_numbers(t_s, first_s));
-        Some(Self { period_s: period(t_s, &numbers)?, numbers, cost })
+        Some(Self { first_s, period_s: period(t_s, &numbers)?, numbers, cost })
     }
 
     /// SamplingPeriod and numbers that are found from each other.
     fn settled(self, t_s: &[f64]) -> Self {
         let mut found = self;
         for _ in 1..ROUNDS {
+            if is_same_beat(found.period_s, found.first_s, t_s) {
+                break;
+            }
             match Self::by(t_s, found.period_s) {
                 Some(next) if next.numbers != found.numbers => found = next,
                 _ => break,
