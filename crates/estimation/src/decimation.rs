@@ -5,6 +5,7 @@
 //! sum is kept.
 
 use kinematics::Wheels;
+use rayon::prelude::*;
 
 use crate::records::Records;
 use crate::segment::{MeasuredPose, Segment};
@@ -22,16 +23,11 @@ impl<'a> Decimated<'a> {
     /// Joins intervals in which both wheels keep turning, up to `longest_s` seconds; measurements stay where
     /// they are. `None` where more than half of the intervals would be left.
     pub(crate) fn of(records: &Records<'a>, selections: &[Selection], longest_s: f64) -> Option<Self> {
-        let most = records.segments.iter().map(|segment| segment.intervals.len()).sum::<usize>() / MIN_DECIMATION;
-        let (mut segments, mut ends, mut left) = (Vec::new(), Vec::new(), 0);
-        for segment in &records.segments {
-            let (joined, ends_of_segment) = join_intervals(segment, longest_s);
-            left += joined.intervals.len();
-            if left > most {
-                return None;
-            }
-            segments.push(joined);
-            ends.push(ends_of_segment);
+        let intervals = |segments: &[Segment<'_>]| segments.iter().map(|of| of.intervals.len()).sum::<usize>();
+        let joined = records.segments.par_iter().map(|segment| join_intervals(segment, longest_s));
+        let (segments, ends): (Vec<Segment<'a>>, Vec<Vec<usize>>) = joined.unzip();
+        if intervals(&segments) > intervals(&records.segments) / MIN_DECIMATION {
+            return None;
         }
         let of_segment = |(propagations, ends): (&Vec<PropagationInterval>, &Vec<usize>)| {
             let of_propagation = |propagation: &PropagationInterval| PropagationInterval {
@@ -47,8 +43,7 @@ impl<'a> Decimated<'a> {
                 partial: of.partial.clone(),
             })
             .collect();
-        let records = Records { segments, ..records.clone() };
-        Some(Self { records, selections })
+        Some(Self { records: records.with_segments(segments), selections })
     }
 }
 

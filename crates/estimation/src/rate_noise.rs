@@ -26,7 +26,7 @@ impl ModelFit<'_> {
     /// `None` where nothing is rounded. Its normal equations come by a scan.
     #[must_use]
     pub fn with_noisier_rates(&self) -> Option<Self> {
-        let mut records = (*self.records).clone();
+        let mut records = self.records.copied();
         let segments = records.segments.iter_mut().chain(records.partial.iter_mut().map(|of| &mut of.segment));
         let mut runs: BTreeMap<(usize, usize), Vec<&mut Segment<'_>>> = BTreeMap::new();
         for segment in segments.filter(|segment| segment.quantum_rad != Wheels::both(0.0)) {

@@ -97,6 +97,24 @@ impl<'a> Records<'a> {
         records
     }
 
+    /// The same with other segments.
+    pub(crate) fn with_segments(&self, segments: Vec<Segment<'a>>) -> Self {
+        Self {
+            segments,
+            partial: self.partial.clone(),
+            gyro_scale_sigma: self.gyro_scale_sigma,
+            map: self.map,
+            common_scale: self.common_scale,
+            unused: self.unused.clone(),
+            ids: self.ids.clone(),
+        }
+    }
+
+    /// A copy, which takes all cores: a long log has a hundred megabytes.
+    pub(crate) fn copied(&self) -> Self {
+        self.with_segments(self.segments.par_iter().cloned().collect())
+    }
+
     /// Of no run.
     pub(crate) fn nothing() -> Self {
         Self {

@@ -57,7 +57,7 @@ impl ModelFit<'_> {
     /// are those of the fit.
     #[must_use]
     pub fn resimulated(&self, terms: &mut [Box<dyn ModelTerm>], number: u64) -> Self {
-        let mut records = (*self.records).clone();
+        let mut records = self.records.copied();
         // What was measured beside the poses is of the motion that was driven, not of the one that is drawn.
         records.partial.iter_mut().filter(|of| of.has_poses()).for_each(|of| of.observations.clear());
         let mut carried: Option<CarriedState> = None;
