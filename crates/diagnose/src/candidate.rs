@@ -49,14 +49,6 @@ impl Candidate {
         matches!((self, other), (Self::Effect { id, .. }, Self::Effect { id: of, .. }) if id == of)
     }
 
-    /// Whether it goes by the single rows of the log.
-    pub(crate) fn goes_by_rows(&self) -> bool {
-        match self {
-            Self::Effect { id, .. } => effects::description(id).is_some_and(|description| description.goes_by_rows),
-            Self::Sparse(sparse) => *sparse == Sparse::of_rows(),
-        }
-    }
-
     /// How the records' stamps are without it, where it is in the stamps alone.
     pub(crate) fn restamped(&self) -> Option<effects::Restamped> {
         match self {

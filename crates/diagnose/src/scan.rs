@@ -122,8 +122,7 @@ pub(crate) fn freedom(fit: &ModelFit<'_>, equations: &NormalEquations) -> f64 {
 /// `answer` gets them, what the fit leaves of their columns, and the normal equations. Nothing where the
 /// fit's own columns are not determined.
 ///
-/// Rows of a fast log are taken together where the fit stays the same on them; parts that depend on single
-/// rows are evaluated row by row.
+/// Rows of a fast log are taken together where the fit stays the same on them.
 pub(crate) fn scan_parts_of<T: Send>(
     fit: &ModelFit<'_>,
     chosen: &[Candidate],
@@ -131,54 +130,40 @@ pub(crate) fn scan_parts_of<T: Send>(
     answer: impl Fn(&[Candidate], &Projected, &NormalEquations) -> T + Sync,
 ) -> Vec<T> {
     let coarse = fit.decimated(&mut terms(chosen), DECIMATION_STEP_S);
-    let is_by_rows = |part: &[Candidate]| coarse.is_none() || part.iter().any(Candidate::goes_by_rows);
-    let numbered = || parts.iter().copied().enumerate();
-    let by_rows = passes(numbered().filter(|(_, part)| is_by_rows(part))).into_iter().map(|parts| (fit, parts));
-    let decimated = coarse.iter().flat_map(|coarse| {
-        passes(numbered().filter(|(_, part)| !is_by_rows(part))).into_iter().map(move |parts| (coarse, parts))
-    });
-    let of_pass = |(fit, parts): &(&ModelFit<'_>, Vec<NumberedPart<'_>>)| {
+    let fit = coarse.as_ref().unwrap_or(fit);
+    let of_pass = |parts: &&[&[Candidate]]| {
         let mut all = terms(chosen);
         let mut at = Column::BASE.len() + all.iter().map(|term| term.parameters().len()).sum::<usize>();
-        all.extend(batched_terms(parts.iter().flat_map(|(_, part)| *part)));
-        let columns_of: Vec<usize> = parts.iter().map(|(_, part)| columns_of(part)).collect();
+        all.extend(batched_terms(parts.iter().copied().flatten()));
+        let columns_of: Vec<usize> = parts.iter().map(|part| columns_of(part)).collect();
         let Some(equations) = total(&fit.scan_parts(&mut all, &columns_of)) else { return Vec::new() };
         let Some(projection) = fit.eliminated(&equations, &[]) else { return Vec::new() };
-        let of_part = |((number, part), own): (&NumberedPart<'_>, &usize)| {
+        let of_part = |(part, own): (&&[Candidate], &usize)| {
             let columns: Vec<usize> = (at..at + own).collect();
             at += own;
-            (*number, answer(part, &projection.of_columns(&equations, &columns), &equations))
+            answer(part, &projection.of_columns(&equations, &columns), &equations)
         };
-        parts.iter().zip(&columns_of).map(of_part).collect::<Vec<(usize, T)>>()
+        parts.iter().zip(&columns_of).map(of_part).collect::<Vec<T>>()
     };
-    let all: Vec<_> = by_rows.chain(decimated).collect();
-    let mut answers: Vec<(usize, T)> = all.par_iter().flat_map_iter(of_pass).collect();
-    answers.sort_by_key(|(number, _)| *number);
-    answers.into_iter().map(|(_, answer)| answer).collect()
+    passes(parts).par_iter().flat_map_iter(of_pass).collect()
 }
-
-/// A part of a scan, with its index among all parts.
-type NumberedPart<'c> = (usize, &'c [Candidate]);
 
 fn columns_of(part: &[Candidate]) -> usize {
     part.iter().map(|candidate| candidate.parameters().len()).sum()
 }
 
 /// The parts in the groups of one pass each: as many columns as a pass carries well.
-fn passes<'c>(parts: impl Iterator<Item = NumberedPart<'c>>) -> Vec<Vec<NumberedPart<'c>>> {
-    let mut passes: Vec<Vec<NumberedPart<'c>>> = Vec::new();
-    let mut columns = 0;
-    for part in parts {
-        let own = columns_of(part.1);
+fn passes<'p, 'c>(parts: &'p [&'c [Candidate]]) -> Vec<&'p [&'c [Candidate]]> {
+    let (mut passes, mut first, mut columns) = (Vec::new(), 0, 0);
+    for (number, part) in parts.iter().enumerate() {
+        let own = columns_of(part);
         columns += own;
-        match passes.last_mut() {
-            Some(last) if columns <= MAX_COLUMNS_PER_PASS => last.push(part),
-            _ => {
-                passes.push(vec![part]);
-                columns = own;
-            }
+        if columns > MAX_COLUMNS_PER_PASS && number > first {
+            passes.push(&parts[first..number]);
+            (first, columns) = (number, own);
         }
     }
+    passes.push(&parts[first..]);
     passes
 }
 

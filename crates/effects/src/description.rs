@@ -25,9 +25,6 @@ pub struct Description {
     pub isolated_error: Option<IsolatedError>,
     /// How its fault of the records is treated; of record faults only.
     pub record_fault: RecordFault,
-    /// Its mean term depends on single rows of the log, not only on what the wheels did between two
-    /// measurements.
-    pub goes_by_rows: bool,
     /// The records with the stamps that they would have without it; of effects that are in the stamps alone.
     pub restamped: Option<Restamped>,
     /// The estimate of its only parameter by the counts alone; of effects that are in the stamps alone.
@@ -82,7 +79,6 @@ impl Description {
             excitation: Excitation::Manoeuvres,
             isolated_error: None,
             record_fault: RecordFault::WITH_A_TRACE,
-            goes_by_rows: false,
             restamped: None,
             shown_by_counts: None,
             clock_offset: None,

@@ -47,7 +47,8 @@ impl<'a> Decimated<'a> {
     }
 }
 
-/// A segment with its intervals joined between measurements, and for each number of intervals before the
+/// A segment with its intervals joined between measurements, in a log without gaps: what a row between gaps
+/// took longer than by the beat stays with its own speed. For each number of intervals before the
 /// number now; the latter holds at measurements only.
 fn join_intervals<'a>(segment: &Segment<'a>, longest_s: f64) -> (Segment<'a>, Vec<usize>) {
     let mut ends = Vec::with_capacity(segment.intervals.len() + 1);
@@ -58,7 +59,8 @@ fn join_intervals<'a>(segment: &Segment<'a>, longest_s: f64) -> (Segment<'a>, Ve
         ends.push(joined.len());
         match joined.last_mut() {
             Some(last)
-                if !measured_before
+                if segment.info.continuous
+                    && !measured_before
                     && last.dt_s + interval.dt_s <= longest_s * (1.0 + STEP_LENGTH_TOLERANCE)
                     && keeps_turning(last.wheel_rad, interval.wheel_rad) =>
             {

@@ -77,7 +77,6 @@ impl PhysicalEffect for IntervalError {
         Description {
             summary: Summary::Meaning,
             excitation: Excitation::Conditions("log at intervals that differ"),
-            goes_by_rows: true,
             restamped: Some(restamped),
             shown_by_counts: Some(share_by_counts),
             benchmark: Benchmark {
