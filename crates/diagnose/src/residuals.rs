@@ -7,11 +7,12 @@
 
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
-use std::rc::Rc;
+use std::sync::Arc;
 
 use dataset::RunInfo;
 use estimation::{KinematicSample, ModelFit};
 use kinematics::{Side, wrap_to_pi};
+use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::augmented_model::AugmentedModel;
@@ -116,7 +117,7 @@ fn degrees(angle_rad: f64) -> f64 {
 }
 
 /// The value of a covariate at a measurement; `None` where it has none.
-type CovariateValue = dyn Fn(&Conditions<'_>) -> Option<f64>;
+type CovariateValue = dyn Fn(&Conditions<'_>) -> Option<f64> + Sync;
 
 /// A covariate of a measurement, and how it is cut into bins.
 struct Covariate {
@@ -180,7 +181,7 @@ fn covariates(fit: &ModelFit<'_>) -> Vec<Covariate> {
 
 /// A residual with the values of the covariates.
 struct Residual {
-    values: Rc<Vec<Option<f64>>>,
+    values: Arc<Vec<Option<f64>>>,
     component: usize,
     size: f64,
     z: f64,
@@ -198,13 +199,13 @@ fn residuals_of(model: &AugmentedModel<'_>, covariates: &[Covariate]) -> Vec<Res
         let t_s = records.measurement_s(sample.segment, sample.measurement)?;
         let at = Conditions { sample, t_s, run };
         let values: Vec<Option<f64>> = covariates.iter().map(|covariate| (covariate.value)(&at)).collect();
-        Some(((sample.segment, sample.measurement), Rc::new(values)))
+        Some(((sample.segment, sample.measurement), Arc::new(values)))
     };
-    let values: BTreeMap<(usize, usize), Rc<Vec<Option<f64>>>> = samples.iter().filter_map(values).collect();
+    let values: BTreeMap<(usize, usize), Arc<Vec<Option<f64>>>> = samples.iter().filter_map(values).collect();
     innovations
         .iter()
         .filter_map(|innovation| {
-            let values = Rc::clone(values.get(&(innovation.segment, innovation.measurement))?);
+            let values = Arc::clone(values.get(&(innovation.segment, innovation.measurement))?);
             let (component, z) = (innovation.component, innovation.z);
             Some(Residual { values, component, size: z * innovation.sigma, z })
         })
@@ -217,7 +218,7 @@ pub(crate) fn residuals(base: &ModelFit<'_>, model: &AugmentedModel<'_>) -> Resi
     let before = residuals_of(&AugmentedModel::base(base), &covariates);
     let after = residuals_of(model, &covariates);
     let measurements = before.iter().filter(|residual| residual.component == 0).count();
-    let by_covariate = covariates.iter().enumerate().filter_map(|(number, covariate)| {
+    let by_covariate = covariates.par_iter().enumerate().filter_map(|(number, covariate)| {
         let components: Vec<Component> = ["along", "across", "heading"]
             .iter()
             .enumerate()
