@@ -182,7 +182,7 @@ impl<'t> CalibratedTracks<'t> {
         let mut drive =
             Drive { scale: Wheels { left: of_left / mean, right: of_right / mean }, separation_m: mean.recip() };
         // Places.
-        let poses = |drive: &Drive| tracks.iter().map(|track| track.dead_reckoned(drive)).collect::<Vec<_>>();
+        let poses = |drive: &Drive| tracks.par_iter().map(|track| track.dead_reckoned(drive)).collect::<Vec<_>>();
         let dead_reckoned = poses(&drive);
         let rows: Vec<ExtrinsicsRow> = tracks
             .iter()

@@ -12,6 +12,7 @@ mod other_extrinsics;
 
 use dataset::{Dataset, UnknownMotion};
 use kinematics::Pose;
+use rayon::prelude::*;
 
 pub(crate) use self::events::AnomalyKind;
 use self::events::{Event, Limits};
@@ -46,8 +47,10 @@ pub(crate) fn unknown_motions(datasets: &[Dataset], late_s: f64, tick_s: f64) ->
     let tracks = PoseTrack::of_all(datasets, late_s);
     let calibrated = CalibratedTracks::of(&tracks, separation_m)?;
     let limits = Limits::of(&calibrated, separation_m, tick_s);
-    let of_tracks: Vec<Vec<Event>> =
-        (0..tracks.len()).map(|track| limits.events(&calibrated, track, calibrated.body_from_sensor)).collect();
+    let of_tracks: Vec<Vec<Event>> = (0..tracks.len())
+        .into_par_iter()
+        .map(|track| limits.events(&calibrated, track, calibrated.body_from_sensor))
+        .collect();
     let otherwise = other_extrinsics(&calibrated, &limits, &of_tracks);
     let is_left_out = |track: usize| otherwise.iter().any(|(of, _)| *of == track);
     let mut events: Vec<(usize, Event)> = Vec::new();

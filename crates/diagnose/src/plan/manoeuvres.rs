@@ -7,6 +7,7 @@ use dataset::{Dataset, Displacement, Odometry, Provenance, Run, RunInfo, TruthNo
 use estimation::{Model, ModelFit, NormalEquations, total};
 use kinematics::{Increment, Pose, Wheels};
 use motion_programs::{Cost, Motion, MotionProgram, Schedule};
+use rayon::prelude::*;
 
 use super::constraints::{Reading, Setting};
 use crate::candidate::{Candidate, terms};
@@ -319,7 +320,7 @@ pub(crate) fn equations_of(
     manoeuvres: &[Manoeuvre],
 ) -> Vec<(Manoeuvre, NormalEquations)> {
     manoeuvres
-        .iter()
+        .par_iter()
         .filter_map(|manoeuvre| {
             let dataset = planned(manoeuvre, setting, &fit.solution.model);
             let planned = fit.on_planned_runs(&[dataset.session()]);
