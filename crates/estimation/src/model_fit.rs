@@ -6,6 +6,7 @@ use std::sync::Arc;
 use dataset::Session;
 use model_term::ModelTerm;
 use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen, Vector3};
+use rayon::prelude::*;
 
 use crate::error::EstimationError;
 use crate::map_distortion::{OwnScatter, added_covariance};
@@ -179,7 +180,8 @@ impl ModelFit<'_> {
     #[must_use]
     pub fn correlation(&self) -> f64 {
         let times_taken = self.times_taken();
-        (0..3)
+        let of_each: Vec<f64> = (0..3)
+            .into_par_iter()
             .map(|component| {
                 let (mut products, mut squares, mut pairs, mut count) = (0.0, 0.0, 0.0_f64, 0.0);
                 for phase in self.solution.pass.innovations.iter() {
@@ -199,7 +201,8 @@ impl ModelFit<'_> {
                 }
                 if pairs == 0.0 { 0.0 } else { products / (squares / count) / (pairs * times_taken).sqrt() }
             })
-            .fold(0.0, |largest: f64, z| largest.max(z.abs()))
+            .collect();
+        of_each.into_iter().fold(0.0, |largest: f64, z| largest.max(z.abs()))
     }
 
     /// Mean number of phases in which the errors of a measurement are: all of them for poses, as their

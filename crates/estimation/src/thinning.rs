@@ -12,6 +12,7 @@
 use std::ops::Range;
 
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
 use crate::covariances::Covariances;
 use crate::model::Model;
@@ -71,19 +72,16 @@ impl Selection {
     pub fn of(records: &Records<'_>, thinning: Thinning, nominal: &Model) -> Vec<Self> {
         let partial: Vec<_> = records.partial.iter().map(|of| Some(between_places(of, nominal))).collect();
         let offset = |phase: usize| phase as f64 / thinning.phases as f64;
-        (0..thinning.phases)
-            .map(|phase| Self {
-                partial: partial.clone(),
-                propagations: records
-                    .segments
-                    .chunk_by(Segment::is_in_series_with)
-                    .flat_map(|series| {
-                        let taken = taken_of_series(series, thinning.every_s, offset(phase));
-                        series.iter().zip(taken).map(|(segment, taken)| propagations(segment, &taken, nominal))
-                    })
-                    .collect(),
-            })
-            .collect()
+        let all_series: Vec<&[Segment<'_>]> = records.segments.chunk_by(Segment::is_in_series_with).collect();
+        let of_series = |series: &[Segment<'_>], phase: usize| -> Vec<_> {
+            let taken = taken_of_series(series, thinning.every_s, offset(phase));
+            series.iter().zip(taken).map(|(segment, taken)| propagations(segment, &taken, nominal)).collect()
+        };
+        let of_phase = |phase: usize| Self {
+            partial: partial.clone(),
+            propagations: all_series.par_iter().flat_map_iter(|series| of_series(series, phase)).collect(),
+        };
+        (0..thinning.phases).into_par_iter().map(of_phase).collect()
     }
 
     /// One of several blocks of each run: by its segments where it has as many, else by the measurements of
