@@ -71,7 +71,7 @@ pub(crate) fn score(number: u64, case: &Case, scope: Scope) -> Result<CaseResult
             result.gain = gain(case, Some(&diagnosis))?;
             result.other_session = other_session(case, &diagnosis)?;
             if case.case_kind == CaseKind::Single {
-                result.planned = planned(case, &result, diagnosis.document.next_experiment.as_ref())?;
+                result.planned = planned(case, &result)?;
             }
         }
         Err(error) => {

@@ -66,6 +66,7 @@ impl Status {
             Self::NotDiscriminated => "not discriminated from what was found",
             Self::ExplainsLess => "explains less than what was found, and is not needed beside that",
             Self::Refused(Refusal::Unphysical) => "significant, but its estimates are those of no possible effect",
+            Self::Refused(Refusal::Implausible) => "significant, but its size is beyond what robots have",
             Self::Refused(Refusal::OtherWheels) => {
                 "significant, but with it the wheels are far from the stated ones, and without it they are not"
             }

@@ -12,7 +12,7 @@ use crate::fit_cache::FitCache;
 use crate::geometry_deviations::keeps_wheels;
 use crate::model_comparison::{log_odds_margin, occam_factor, relative_odds};
 use crate::null_distribution::NullDistribution;
-use crate::physical::is_physical;
+use crate::physical::{is_physical, is_plausible};
 use crate::ranking::Entry;
 use crate::settings::search::{
     CLOSE_RIVAL_FRACTION, CLOSE_RIVAL_STATISTIC, MAX_CLOSE_RIVALS, MAX_FURTHER_VARIANTS, MAX_RIVALS,
@@ -26,6 +26,8 @@ use crate::wald::wald_test;
 pub enum Refusal {
     /// Its estimates are those of no effect that can be.
     Unphysical,
+    /// Its size is beyond what robots have.
+    Implausible,
     /// With it the wheels are far from the stated ones, and without it they are not.
     OtherWheels,
     /// The refit does not confirm what the score says of it.
@@ -93,6 +95,9 @@ pub(crate) fn rivals<'a>(
         if !is_physical(extended, index) {
             return Some(Refusal::Unphysical);
         }
+        if !is_plausible(extended, index) {
+            return Some(Refusal::Implausible);
+        }
         (!keeps_wheels(&without.fit, &extended.fit)).then_some(Refusal::OtherWheels)
     };
     let is_possible = |extended: &AugmentedModel<'_>| impossible(extended).is_none();
@@ -110,15 +115,20 @@ pub(crate) fn rivals<'a>(
     }
     let most = fits.iter().map(|extended| count(&extended.fit)).fold(count(&without.fit), f64::max);
     let base_cost = cost(&without.fit, most);
-    let inflation = inflation_of_each(without, index, &fits);
+    let explained = |extended: &AugmentedModel<'_>| base_cost - cost(&extended.fit, most);
+    // Causes are compared on the same data: what coarse encoders inflate of the one that explains most, they
+    // inflate of all. By its own inflation each, one that explains less might come first.
+    let of_each = inflation_of_each(without, index, &fits);
+    let of_best = fits.iter().zip(&of_each).max_by(|a, b| explained(a.0).total_cmp(&explained(b.0)));
+    let common = of_best.map_or(1.0, |(_, inflation)| *inflation);
     let mut named: Vec<(Name, AugmentedModel<'a>)> = fits
         .into_iter()
-        .zip(inflation)
+        .zip(of_each)
         .map(|(extended, inflation)| {
             let candidate = extended.candidates[index].clone();
             let variants = entries.iter().find(|entry| entry.scored.candidate.id() == candidate.id());
             let trials = variants.map_or(1, |entry| entry.variants.max(1));
-            let likelier = (base_cost - cost(&extended.fit, most)) / inflation;
+            let likelier = explained(&extended) / common;
             let directions = wald_test(&extended, index).map(|(_, directions)| directions);
             let (log_odds, explains) = odds_and_explained(likelier, directions.as_deref(), trials);
             (Name { candidate, log_odds, explains, inflation, outdone: false }, extended)

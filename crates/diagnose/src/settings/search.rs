@@ -114,6 +114,10 @@ pub(crate) const MAX_CONTACT_VARIANCE_RATIO: f64 = 4.0;
 /// Tuned: by hand; no record of what on.
 pub(crate) const INSIGNIFICANT_ESTIMATE_SIGMAS: f64 = 3.0;
 
+/// Times what is plausible. A larger size of an effect names nothing.
+/// Convention: an order of magnitude, as what is plausible is known to no better.
+pub(crate) const MAX_PLAUSIBLE_SIZES: f64 = 10.0;
+
 /// Number. Parabolas that are fitted to a profile likelihood, each on a smaller step.
 /// Tuned: by hand; no record of what on.
 pub(crate) const PROFILE_ITERATIONS: usize = 2;
