@@ -18,6 +18,7 @@ mod imported;
 mod interval_means;
 mod map_distortion;
 mod measurement_times;
+mod median;
 mod name_units;
 mod partial;
 mod pose_covariance;

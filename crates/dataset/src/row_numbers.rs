@@ -1,7 +1,7 @@
-//! The likeliest numbers of a log's rows on a beat (Viterbi 1967): each path through lost and late rows has its
-//! own idea of how late rows usually are, and the likeliest few are followed side by side.
+//! The likeliest numbers of a log's rows on a beat (Viterbi 1967): each path through lost and late rows has
+//! its own idea of how late rows usually are, and the likeliest few are followed side by side.
 
-use crate::sampling_period::median;
+use crate::median::median;
 
 /// Paths that are followed side by side.
 const PATHS: usize = 8;

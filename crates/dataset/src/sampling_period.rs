@@ -7,6 +7,7 @@
 //! itself, and what waited behind it. The numbers are the likeliest path through both (Viterbi 1967), each
 //! path with its own idea of how late rows usually are, so that a clock need not keep one beat all day.
 
+use crate::median::median;
 use crate::receipt_delays::Received;
 use crate::row_numbers::likeliest_numbers;
 
@@ -29,8 +30,8 @@ const PHASE_SPANS: [(usize, [f64; 2], u32); 4] =
 const SPANS: usize = 8;
 /// Spans of which phases are taken.
 const PHASES_TAKEN: usize = 1000;
-/// Ticks that two beats which number the rows of a log alike are apart at its end: far below the jitter of any
-/// log that is not exact.
+/// Ticks that two beats which number the rows of a log alike are apart at its end: far below the jitter of
+/// any log that is not exact.
 const SAME_BEAT_TICKS: f64 = 0.01;
 /// Where stamps are later than that share of the beat, root mean square, some numbers of rows are wrong.
 const MAX_CERTAIN_LATENESS: f64 = 0.25;
@@ -108,11 +109,6 @@ impl SamplingPeriod {
 
 fn root_mean_square(values: &[f64]) -> f64 {
     (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt()
-}
-
-pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 /// Beats before numbers are known: the mean gap, as if no row were lost; and the one of which spans of a few

@@ -115,11 +115,11 @@ fn explained_by(
         if !is_plausible && !visible_in_log {
             return None;
         }
-        let gain = base.map_or(f64::MAX, |base| {
-            // Measurements that only one of the fits explains are charged as outliers to the other.
-            let measurements = count(base).max(count(&fit));
-            cost(base, measurements) + implausible(base) - cost(&fit, measurements) - implausible(&fit)
-        });
+        // Measurements that only one explains are charged as outliers to the other. No cost explains nothing.
+        let measurements = base.map_or(0.0, count).max(count(&fit));
+        let cost_of = |fit: &ModelFit<'_>| Some(cost(fit, measurements) + implausible(fit)).filter(|of| of.is_finite());
+        let own = cost_of(&fit)?;
+        let gain = base.and_then(cost_of).map_or(f64::MAX, |before| before - own);
         let gain = gain - f64::from(mistakes - 1) * LOG_ODDS_OF_A_MISTAKE;
         // What the log shows needs no instrument; one must not contradict it, where it has anything to say.
         let min_gain = match visible_in_log {
