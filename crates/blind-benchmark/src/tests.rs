@@ -55,6 +55,25 @@ fn a_case_stands_by_itself() {
     assert_ne!(other.as_ref(), Ok(last), "another seed is another case");
 }
 
+/// The robot drives on where causes stand together, and its plan tells them apart.
+#[test]
+fn a_set_of_causes_is_followed_by_the_planned_runs() {
+    let case = challenge_case(Scope::Whole, 26_026, 110).expect("simulates").expect("shows");
+    let planned = case.planned.expect("turn_rate_wheelbase or castor_drag");
+    assert!(planned.names.len() > 1, "{:?}", planned.names);
+    // Rejects a diagnosis without a plan.
+    assert!(planned.planned && planned.resolved_by_plan && !planned.reported.is_empty());
+}
+
+/// A robot with coarse encoders, on whose draws causes that were deflated by their own inflation each left
+/// `unlisted` alone.
+#[test]
+fn regress_the_cause_that_explains_most_does_not_lose_by_its_own_inflation() {
+    let case = challenge_case(Scope::Whole, 26_026, 2269).expect("simulates").expect("shows");
+    let first = case.reported.first().expect("a finding");
+    assert!(first.names.iter().any(|name| name == "slip_acceleration"), "{:?}", first.names);
+}
+
 /// No name, note or key of a dataset tells what is hidden; loads and jitter stand in cases without such an
 /// effect too.
 #[test]
