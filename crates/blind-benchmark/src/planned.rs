@@ -52,7 +52,7 @@ pub(crate) fn planned(case: &Case, result: &CaseResult) -> Result<Option<Planned
         resolved_by_battery: false,
         reported: Vec::new(),
     };
-    // The case is diagnosed without plans, which take a fifth of the time: few need one.
+    // The case was diagnosed without a plan, which takes time and is needed by few.
     let next = diagnose(&case.datasets, &Options::default()).ok().and_then(|found| found.document.next_experiment);
     if let Some(next) = next.filter(|next| next.predicted.is_some()) {
         let (resolved, more) = resolves(sessions(case, &next))?;

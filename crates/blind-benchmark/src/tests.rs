@@ -55,7 +55,7 @@ fn a_case_stands_by_itself() {
     assert_ne!(other.as_ref(), Ok(last), "another seed is another case");
 }
 
-/// The robot drives on where causes stand together, and its plan tells them apart.
+/// The robot drives on where causes stand together, and its plan discriminates them.
 #[test]
 fn a_set_of_causes_is_followed_by_the_planned_runs() {
     let case = challenge_case(Scope::Whole, 26_026, 110).expect("simulates").expect("shows");

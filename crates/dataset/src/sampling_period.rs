@@ -72,10 +72,13 @@ impl SamplingPeriod {
         let Numbered { period_s, numbers, .. } = match Numbered::by(t_s, gap_s) {
             Some(exact) if exact.cost == f64::NEG_INFINITY => exact,
             of_gap => {
-                let [mean_s, phases_s] = first_periods(t_s)?;
-                let first = [Some(mean_s), (!is_same_beat(phases_s, mean_s, t_s)).then_some(phases_s)];
-                let others = first.into_iter().flatten().filter(|first_s| !is_same_beat(*first_s, gap_s, t_s));
-                let others = others.filter_map(|first_s| Numbered::by(t_s, first_s));
+                let mut tried_s = vec![gap_s];
+                for first_s in first_periods(t_s)? {
+                    if !tried_s.iter().any(|tried_s| is_same_beat(first_s, *tried_s, t_s)) {
+                        tried_s.push(first_s);
+                    }
+                }
+                let others = tried_s[1..].iter().filter_map(|first_s| Numbered::by(t_s, *first_s));
                 let found = of_gap.into_iter().chain(others).min_by(|a, b| a.cost.total_cmp(&b.cost))?;
                 found.settled(t_s)
             }

@@ -165,7 +165,7 @@ fn stages(
 ) -> Result<Diagnosis, DiagnoseError> {
     let begins = |step| options.on_stage.begins(step);
     begins(Step::Motions);
-    // Each run's, at once: all that asks for them later asks run by run.
+    // The sampling periods of all runs, on all cores: whoever asks for them later asks run by run.
     datasets.par_iter().flat_map(|dataset| &dataset.runs).for_each(|run| {
         let _ = run.odometry.t_s.sampling_period();
     });

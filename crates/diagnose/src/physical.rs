@@ -31,8 +31,9 @@ pub(crate) fn is_plausible(extended: &AugmentedModel<'_>, index: usize) -> bool 
 
 /// Whether no estimate is beyond what is plausible by more than its error.
 fn are_plausible(parameters: &[TermParameter], estimates: &[(f64, f64)]) -> bool {
-    parameters.iter().zip(estimates).all(|(parameter, (size, sigma))| {
-        size.abs() - INSIGNIFICANT_ESTIMATE_SIGMAS * sigma <= MAX_PLAUSIBLE_SIZES * parameter.prior_sigma
+    // An error that is not determined shows nothing.
+    !parameters.iter().zip(estimates).any(|(parameter, (size, sigma))| {
+        size.abs() - INSIGNIFICANT_ESTIMATE_SIGMAS * sigma > MAX_PLAUSIBLE_SIZES * parameter.prior_sigma
     })
 }
 
@@ -76,5 +77,6 @@ mod tests {
         assert!(!are_plausible(&both, &[(0.1, 0.01), (-0.11, 1e-3)]));
         // Three standard deviations of 0.01 reach it.
         assert!(are_plausible(&both, &[(0.1, 0.01), (-0.11, 0.01)]));
+        assert!(are_plausible(&both, &[(20.0, f64::NAN), (0.0, 0.01)]), "nobody knows its error");
     }
 }

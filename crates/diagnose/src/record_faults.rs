@@ -115,7 +115,7 @@ fn explained_by(
         if !is_plausible && !visible_in_log {
             return None;
         }
-        // Measurements that only one explains are charged as outliers to the other. No cost explains nothing.
+        // Measurements that only one fit explains are outliers to the other; one without a cost is no base.
         let measurements = base.map_or(0.0, count).max(count(&fit));
         let cost_of = |fit: &ModelFit<'_>| Some(cost(fit, measurements) + implausible(fit)).filter(|of| of.is_finite());
         let own = cost_of(&fit)?;

@@ -115,7 +115,11 @@ pub(crate) fn rivals<'a>(
     }
     let most = fits.iter().map(|extended| count(&extended.fit)).fold(count(&without.fit), f64::max);
     let base_cost = cost(&without.fit, most);
-    let explained = |extended: &AugmentedModel<'_>| base_cost - cost(&extended.fit, most);
+    // A likelihood that is no number says nothing for the candidate.
+    let explained = |extended: &AugmentedModel<'_>| match base_cost - cost(&extended.fit, most) {
+        likelier if likelier.is_nan() => f64::NEG_INFINITY,
+        likelier => likelier,
+    };
     // Causes are compared on the same data: what coarse encoders inflate of the one that explains most, they
     // inflate of all. By its own inflation each, one that explains less might come first.
     let of_each = inflation_of_each(without, index, &fits);
@@ -183,8 +187,6 @@ fn contenders(entries: &[Entry], best: f64) -> Vec<&Entry> {
 /// how much likelier it makes the data, its estimates along principal directions, and how many variants were
 /// tried.
 fn odds_and_explained(likelier: f64, directions: Option<&[(f64, f64)]>, trials: usize) -> (f64, f64) {
-    // A likelihood that is no number says nothing for the candidate.
-    let likelier = if likelier.is_nan() { f64::NEG_INFINITY } else { likelier };
     let log_odds = directions.map_or(f64::NEG_INFINITY, |directions| likelier + occam_factor(directions));
     let explains = likelier - 0.5 * directions.map_or(0, <[_]>::len) as f64;
     (log_odds - (trials as f64).ln(), explains)

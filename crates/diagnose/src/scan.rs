@@ -129,6 +129,9 @@ pub(crate) fn scan_parts_of<T: Send>(
     parts: &[&[Candidate]],
     answer: impl Fn(&[Candidate], &Projected, &NormalEquations) -> T + Sync,
 ) -> Vec<T> {
+    if parts.is_empty() {
+        return Vec::new();
+    }
     let coarse = fit.decimated(&mut terms(chosen), DECIMATION_STEP_S);
     let fit = coarse.as_ref().unwrap_or(fit);
     let of_pass = |parts: &&[&[Candidate]]| {

@@ -47,9 +47,9 @@ impl<'a> Decimated<'a> {
     }
 }
 
-/// A segment with its intervals joined between measurements, in a log without gaps: what a row between gaps
-/// took longer than by the beat stays with its own speed. For each number of intervals before the
-/// number now; the latter holds at measurements only.
+/// A segment with its intervals joined between measurements, and for each number of intervals before the
+/// number now; the latter holds at measurements only. In a log with gaps none are joined: what a row took
+/// longer than the sampling period stays with its own speed.
 fn join_intervals<'a>(segment: &Segment<'a>, longest_s: f64) -> (Segment<'a>, Vec<usize>) {
     let mut ends = Vec::with_capacity(segment.intervals.len() + 1);
     let mut joined: Vec<WheelInterval> = Vec::new();
