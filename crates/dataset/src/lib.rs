@@ -26,6 +26,7 @@ mod prefetch;
 mod read;
 mod receipt_delays;
 mod record;
+mod replicates;
 mod retained_rows;
 mod row_lengths;
 mod row_numbers;
@@ -52,6 +53,7 @@ pub use pose_covariance::PoseCovariance;
 pub use prefetch::read_ahead;
 pub use read::{Blocks, Loaded, RunByRun, read};
 pub use receipt_delays::has_bunched_rows;
+pub use replicates::{LANES, ReplicatedReading, ReplicatedRun, Replicates};
 pub use record::{
     CovarianceScale, Dataset, Displacement, ExtraChannel, MarkedPoint, NominalRobot, Odometry, PointReading, Protocol,
     ProtocolSettings, Provenance, Run, RunInfo, TruthNoise, TruthSample, TruthSigma, UnknownMotion, WheelLog,

@@ -113,6 +113,24 @@ pub struct PoseReading {
     pub world_from_body: Pose,
 }
 
+/// What an effect does to the runs of trials that are driven side by side, where that can be said once for
+/// all motions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum LaneForm {
+    /// The wheel separation of every motion is larger by a normal draw of this standard deviation, metres;
+    /// the first draw of a run is not used.
+    SeparationPerMotion {
+        /// One standard deviation, metres.
+        sigma_m: f64,
+    },
+    /// Counters are read in whole ticks of so many counts.
+    Ticks {
+        /// Counts in a tick, at least 1.
+        counts: u32,
+    },
+}
+
 /// Which hooks of an effect do anything. The simulator calls no others, so that an effect costs nothing at
 /// the stages that it leaves alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -224,6 +242,12 @@ pub trait Forward: Send {
     /// *Instrument*: what the outside sees.
     fn instrument(&mut self, reading: &mut PoseReading) {
         let _ = reading;
+    }
+
+    /// What the effect does in all its hooks, where trials are driven side by side; `None` when it must be
+    /// asked trial by trial.
+    fn lane_form(&self) -> Option<LaneForm> {
+        None
     }
 
     /// Why the effect cannot be taken over a whole motion at once, or `None` when that is exact.

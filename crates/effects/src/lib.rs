@@ -24,6 +24,7 @@ mod hypothesis;
 mod motion_history;
 mod on_board;
 mod stream;
+mod stream_lanes;
 mod term;
 mod time_shift;
 
@@ -36,10 +37,11 @@ pub use description::{
 pub use effect::{EffectError, PhysicalEffect};
 pub use estimates::{Estimate, Estimates};
 pub use exemption::{EXEMPT, Exemption, OrdinaryCondition};
-pub use forward::{Command, Forward, Hooks, PoseReading, Readout, RunStart, SampleClock, Step};
+pub use forward::{Command, Forward, Hooks, LaneForm, PoseReading, Readout, RunStart, SampleClock, Step};
 pub use hypothesis::{Hypothesis, RecordCorrection, Sign, Variant};
 pub use on_board::{Code, Correction, Input, IntervalScatter, OnBoard, RawInterval, Scatter, ScatterModel, SizeOf};
 pub use stream::{Address, Stream, StreamName};
+pub use stream_lanes::{StreamLanes, StreamsLanes};
 pub use term::{Sparse, SparseTerm};
 
 /// Declares the catalogue: for each effect its module and its parameters' type.

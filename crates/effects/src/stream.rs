@@ -63,11 +63,14 @@ impl Address {
     #[inline]
     #[must_use]
     pub fn streams(&self) -> Streams {
-        // Point and run share a word.
-        let place = u64::from(self.point) << 32 | u64::from(self.run);
         let seed = mix(self.seed);
         let trial = mix(self.trial ^ seed);
-        Streams { seed, trial, place: mix(place ^ trial), half_widths: &HALF_WIDTHS }
+        Streams { seed, trial, place: mix(self.place() ^ trial), half_widths: &HALF_WIDTHS }
+    }
+
+    /// Point and run in a word that they share.
+    pub(crate) const fn place(&self) -> u64 {
+        (self.point as u64) << 32 | self.run as u64
     }
 }
 
@@ -87,16 +90,23 @@ impl Streams {
     pub fn stream(&self, name: StreamName) -> Stream {
         // A bijection of the address's words and the name's: each was mixed with the ones before it, and is
         // now with the ones after it.
-        let name = mix(name.0 ^ self.place);
-        let place = mix(self.place ^ name);
-        let trial = mix(self.trial ^ place);
-        let seed = mix(self.seed ^ trial);
-        Stream { rng: Xoshiro256PlusPlus([seed, trial, place, name]), half_widths: self.half_widths }
+        Stream { rng: Xoshiro256PlusPlus(state(self.seed, self.trial, self.place, name)), half_widths: self.half_widths }
     }
 }
 
+/// The state of a name's generator, at its beginning, by the address's words.
+#[inline(always)]
+pub(crate) const fn state(seed: u64, trial: u64, place: u64, StreamName(name): StreamName) -> [u64; 4] {
+    let name = mix(name ^ place);
+    let place = mix(place ^ name);
+    let trial = mix(trial ^ place);
+    let seed = mix(seed ^ trial);
+    [seed, trial, place, name]
+}
+
 /// The finaliser of SplitMix64 (Steele, Lea & Flood 2014), a bijection on 64 bits.
-const fn mix(word: u64) -> u64 {
+#[inline(always)]
+pub(crate) const fn mix(word: u64) -> u64 {
     let z = word.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -122,10 +132,8 @@ impl TryRng for Xoshiro256PlusPlus {
 
     #[inline]
     fn try_next_u64(&mut self) -> Result<u64, Infallible> {
-        let Self([a, b, c, d]) = *self;
-        let word = a.wrapping_add(d).rotate_left(23).wrapping_add(a);
-        let (c, d) = (c ^ a, d ^ b);
-        self.0 = [a ^ d, b ^ c, c ^ (b << 17), d.rotate_left(45)];
+        let (word, state) = next_word(self.0);
+        self.0 = state;
         Ok(word)
     }
 
@@ -137,12 +145,20 @@ impl TryRng for Xoshiro256PlusPlus {
     }
 }
 
+/// The next word of a state, and the state after it.
+#[inline(always)]
+pub(crate) const fn next_word([a, b, c, d]: [u64; 4]) -> (u64, [u64; 4]) {
+    let word = a.wrapping_add(d).rotate_left(23).wrapping_add(a);
+    let (c, d) = (c ^ a, d ^ b);
+    (word, [a ^ d, b ^ c, c ^ (b << 17), d.rotate_left(45)])
+}
+
 /// Layers of the ziggurat by which `rand_distr` draws normals (Doornik 2005, ZIGNOR).
-const LAYERS: usize = 256;
+pub(crate) const LAYERS: usize = 256;
 
 /// Half-widths x₀ > x₁ > … > x₂₅₆ = 0 of its layers, read out of it: of a word with layer i in its low byte
 /// and u = 2⁻¹⁰ in the bits above it makes u·xᵢ, exactly.
-static HALF_WIDTHS: LazyLock<[f64; LAYERS + 1]> = LazyLock::new(|| {
+pub(crate) static HALF_WIDTHS: LazyLock<[f64; LAYERS + 1]> = LazyLock::new(|| {
     const U: f64 = 1.0 / 1024.0;
     std::array::from_fn(|layer| {
         if layer == LAYERS {
@@ -182,17 +198,22 @@ pub struct Stream {
 }
 
 impl Stream {
+    /// The stream of a generator's state.
+    pub(crate) const fn at(state: [u64; 4], half_widths: &'static [f64; LAYERS + 1]) -> Self {
+        Self { rng: Xoshiro256PlusPlus(state), half_widths }
+    }
+
+    /// The generator's state.
+    pub(crate) const fn state(&self) -> [u64; 4] {
+        self.rng.0
+    }
+
     /// A standard normal draw.
     #[inline]
     pub fn normal(&mut self) -> f64 {
         let mut rng = self.rng.clone();
-        let word = rng.next_u64();
-        let layer = usize::from(word as u8);
-        // The bits above as u in [−1, 1): the mantissa of a number in [2, 4), less 3.
-        let u = f64::from_bits(word >> 12 | 2_f64.to_bits()) - 3.0;
-        let x = u * self.half_widths[layer];
-        if x.abs() < self.half_widths[layer + 1] {
-            // Inside the layer, as 98.8 % of the draws are.
+        let (x, is_inside) = normal_inside(rng.next_u64(), self.half_widths);
+        if is_inside {
             self.rng = rng;
             x
         } else {
@@ -236,6 +257,16 @@ impl Stream {
     pub fn below(&mut self, n: usize) -> usize {
         ((self.uniform() * n as f64) as usize).min(n.saturating_sub(1))
     }
+}
+
+/// A normal draw of a word, and whether it is inside its layer, as 98.8 % are: no draw where it is not.
+#[inline(always)]
+pub(crate) fn normal_inside(word: u64, half_widths: &[f64; LAYERS + 1]) -> (f64, bool) {
+    let layer = (word & 0xff) as usize;
+    // The bits above as u in [−1, 1): the mantissa of a number in [2, 4), less 3.
+    let u = f64::from_bits(word >> 12 | 2_f64.to_bits()) - 3.0;
+    let x = u * half_widths[layer];
+    (x, x.abs() < half_widths[layer + 1])
 }
 
 /// A normal draw from its beginning, and the generator after it: by value, so that the common case keeps its

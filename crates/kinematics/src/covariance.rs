@@ -14,7 +14,8 @@
 
 use nalgebra::{Matrix3, Matrix3x2, Vector2};
 
-use crate::trig::{sin_cos, sinc_given_sine};
+use crate::elementary::{Branching, Elementary};
+use crate::trig::sin_cos;
 use crate::{Increment, Pose, Wheels, sinc, sinc_derivative};
 
 /// Random-walk noise of each wheel's travel over the ground: standard deviation per square root of travel,
@@ -53,25 +54,39 @@ impl BridgeCovariance {
     #[inline]
     #[must_use]
     pub fn within(travel_m: Wheels<f64>, travel_var_m2: Wheels<f64>, wheel_separation_m: f64) -> Self {
+        Self::within_by(&Branching, travel_m, travel_var_m2, wheel_separation_m)
+    }
+
+    /// [`Self::within`] by given elementary functions.
+    #[inline(always)]
+    #[must_use]
+    pub fn within_by(
+        elementary: &impl Elementary,
+        travel_m: Wheels<f64>,
+        travel_var_m2: Wheels<f64>,
+        wheel_separation_m: f64,
+    ) -> Self {
         let per_m = 1.0 / wheel_separation_m;
         let turn_rad = (travel_m.right - travel_m.left) * per_m;
         let weight = (travel_var_m2.right * travel_m.left * travel_m.left
             + travel_var_m2.left * travel_m.right * travel_m.right)
             * (per_m * per_m);
-        let (along, across) = tangent_variance_over_turn_squared(turn_rad);
+        let (along, across) = tangent_variance_over_turn_squared(elementary, turn_rad);
         Self { along_var_m2: weight * along, across_var_m2: weight * across }
     }
 }
 
 /// Variances of the unit tangent over an arc of turn θ, along and across the chord, divided by θ².
-#[inline]
-fn tangent_variance_over_turn_squared(turn_rad: f64) -> (f64, f64) {
-    if turn_rad.abs() < TANGENT_SERIES_BELOW_RAD {
-        tangent_series(turn_rad)
-    } else {
-        let (sin, cos) = sin_cos(0.5 * turn_rad);
-        tangent_closed_form(turn_rad, sin, cos)
-    }
+#[inline(always)]
+fn tangent_variance_over_turn_squared<E: Elementary>(elementary: &E, turn_rad: f64) -> (f64, f64) {
+    E::choose(
+        turn_rad.abs() < TANGENT_SERIES_BELOW_RAD,
+        || tangent_series(turn_rad),
+        || {
+            let (sin, cos) = elementary.sin_cos(0.5 * turn_rad);
+            tangent_closed_form::<E>(turn_rad, sin, cos)
+        },
+    )
 }
 
 /// Taylor: ½(1+sinc θ) − sinc²(θ/2) = θ⁴/720 − θ⁶/20160 + θ⁸/1209600 − …, ½(1−sinc θ) = θ²/12 − θ⁴/240 +
@@ -87,10 +102,10 @@ fn tangent_series(turn_rad: f64) -> (f64, f64) {
 
 /// By sine and cosine of half the turn; sinc θ = sinc(θ/2)·cos(θ/2).
 #[inline(always)]
-fn tangent_closed_form(turn_rad: f64, sin: f64, cos: f64) -> (f64, f64) {
+fn tangent_closed_form<E: Elementary>(turn_rad: f64, sin: f64, cos: f64) -> (f64, f64) {
     // The division first, which then is done when the sine is.
     let per_tt = 1.0 / (turn_rad * turn_rad);
-    let half = sinc_given_sine(0.5 * turn_rad, sin);
+    let half = E::sinc_given_sine(0.5 * turn_rad, sin);
     let whole = half * cos;
     ((0.5 * (1.0 + whole) - half * half) * per_tt, 0.5 * (1.0 - whole) * per_tt)
 }
@@ -253,8 +268,8 @@ mod tests {
 
     #[test]
     fn the_series_and_the_closed_form_meet() {
-        let below = tangent_variance_over_turn_squared(TANGENT_SERIES_BELOW_RAD * (1.0 - 1e-15));
-        let above = tangent_variance_over_turn_squared(TANGENT_SERIES_BELOW_RAD);
+        let below = tangent_variance_over_turn_squared(&Branching, TANGENT_SERIES_BELOW_RAD * (1.0 - 1e-15));
+        let above = tangent_variance_over_turn_squared(&Branching, TANGENT_SERIES_BELOW_RAD);
         // Cancellation of the closed form: ε/(θ⁴/720) relative, 2e-11 at 0.3 rad for `along`, ε/(θ²/12) for
         // `across`.
         assert!((below.0 / above.0 - 1.0).abs() < 1e-10, "{below:?} {above:?}");

@@ -141,7 +141,7 @@ pub(crate) struct CompensatedSum {
 }
 
 impl CompensatedSum {
-    const fn at(anchor_m: f64) -> Self {
+    pub(crate) const fn at(anchor_m: f64) -> Self {
         Self { anchor_m, dropped_m: 0.0, moved_m: 0.0 }
     }
 

@@ -2,7 +2,8 @@
 
 use std::f64::consts::PI;
 
-use crate::trig::{sin_cos, sinc_given_sine};
+use crate::elementary::{Branching, Elementary};
+use crate::trig::sin_cos;
 use crate::{Frame, Pose, Wheels};
 
 /// Why a drive geometry or a count scale is not one.
@@ -125,7 +126,7 @@ pub struct Increment {
 
 impl Increment {
     /// Motion for wheel travels over a separation, metres (paper, eq. 1 and 2).
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn from_travel(travel_m: Wheels<f64>, wheel_separation_m: f64) -> Self {
         Self {
@@ -139,7 +140,7 @@ impl Increment {
     #[inline]
     #[must_use]
     pub fn arc(self) -> Pose {
-        self.perturbed_arc(0.0, 0.0).pose()
+        self.chord(&Branching).0
     }
 
     /// `before_from_after` along the exact circular arc, its end displaced in the frame of the chord: ahead
@@ -147,16 +148,27 @@ impl Increment {
     #[inline]
     #[must_use]
     pub fn perturbed_arc(self, along_m: f64, across_m: f64) -> Frame {
-        let half_rad = 0.5 * self.turn_rad;
-        let (sin, cos) = sin_cos(half_rad);
-        let chord_m = self.distance_m * sinc_given_sine(half_rad, sin);
-        let mut before_from_after = Pose::new(chord_m * cos, chord_m * sin, self.turn_rad);
-        if along_m != 0.0 || across_m != 0.0 {
-            before_from_after.x_m += cos * along_m - sin * across_m;
-            before_from_after.y_m += sin * along_m + cos * across_m;
-        }
+        self.perturbed_arc_by(&Branching, along_m, across_m)
+    }
+
+    /// [`Self::perturbed_arc`] by given elementary functions.
+    #[inline(always)]
+    #[must_use]
+    pub fn perturbed_arc_by<E: Elementary>(self, elementary: &E, along_m: f64, across_m: f64) -> Frame {
+        let (mut before_from_after, (sin, cos)) = self.chord(elementary);
+        before_from_after.x_m += cos * along_m - sin * across_m;
+        before_from_after.y_m += sin * along_m + cos * across_m;
         // The whole turn's from the half's: 2·sin·cos, 1 − 2·sin².
         Frame::with_heading(before_from_after, (2.0 * sin * cos, 1.0 - 2.0 * sin * sin))
+    }
+
+    /// The arc's end, and sine and cosine of half its turn.
+    #[inline(always)]
+    fn chord<E: Elementary>(self, elementary: &E) -> (Pose, (f64, f64)) {
+        let half_rad = 0.5 * self.turn_rad;
+        let (sin, cos) = elementary.sin_cos(half_rad);
+        let chord_m = self.distance_m * E::sinc_given_sine(half_rad, sin);
+        (Pose::new(chord_m * cos, chord_m * sin, self.turn_rad), (sin, cos))
     }
 
     /// `before_from_after` by the paper's midpoint rule (eq. 3): the arc length taken for the chord.

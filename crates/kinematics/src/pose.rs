@@ -2,7 +2,7 @@
 
 use std::ops::Mul;
 
-use crate::trig::sin_cos;
+use crate::elementary::{Branching, Elementary};
 
 /// A point in some frame, metres.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -111,6 +111,29 @@ impl Frame {
         Self { a_from_b, sin, cos }
     }
 
+    /// A pose as a frame, by given elementary functions.
+    #[inline(always)]
+    #[must_use]
+    pub fn by(elementary: &impl Elementary, a_from_b: Pose) -> Self {
+        let (sin, cos) = elementary.sin_cos(a_from_b.theta_rad);
+        Self { a_from_b, sin, cos }
+    }
+
+    /// The pose's x, y and heading, and sine and cosine of that: as [`Self::from_numbers`] takes them.
+    #[inline(always)]
+    #[must_use]
+    pub const fn numbers(self) -> [f64; 5] {
+        let Self { a_from_b: Pose { x_m, y_m, theta_rad }, sin, cos } = self;
+        [x_m, y_m, theta_rad, sin, cos]
+    }
+
+    /// A frame by its [`Self::numbers`].
+    #[inline(always)]
+    #[must_use]
+    pub const fn from_numbers([x_m, y_m, theta_rad, sin, cos]: [f64; 5]) -> Self {
+        Self { a_from_b: Pose::new(x_m, y_m, theta_rad), sin, cos }
+    }
+
     /// The pose at another place, m.
     #[inline]
     #[must_use]
@@ -121,14 +144,14 @@ impl Frame {
     }
 
     /// The pose itself.
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub const fn pose(&self) -> Pose {
         self.a_from_b
     }
 
     /// `b_from_a`.
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn inverse(self) -> Self {
         let Self { a_from_b: Pose { x_m, y_m, theta_rad }, sin, cos } = self;
@@ -139,8 +162,7 @@ impl Frame {
 impl From<Pose> for Frame {
     #[inline]
     fn from(a_from_b: Pose) -> Self {
-        let (sin, cos) = sin_cos(a_from_b.theta_rad);
-        Self { a_from_b, sin, cos }
+        Self::by(&Branching, a_from_b)
     }
 }
 
@@ -150,7 +172,7 @@ impl Mul for Frame {
     /// `a_from_b * b_from_c = a_from_c`, sine and cosine by the addition theorem: each product adds a
     /// rounding of 2e-16 rad to them, where the product with a
     /// [`Pose`] adds none and costs a sine and cosine.
-    #[inline]
+    #[inline(always)]
     fn mul(self, b_from_c: Self) -> Self {
         Self {
             a_from_b: self * b_from_c.a_from_b,
@@ -164,7 +186,7 @@ impl Mul<Pose> for Frame {
     type Output = Pose;
 
     /// `a_from_b * b_from_c = a_from_c`.
-    #[inline]
+    #[inline(always)]
     fn mul(self, b_from_c: Pose) -> Pose {
         let position = self * b_from_c.position();
         Pose::new(position.x_m, position.y_m, self.a_from_b.theta_rad + b_from_c.theta_rad)
@@ -175,7 +197,7 @@ impl Mul<Point> for Frame {
     type Output = Point;
 
     /// A point of b, seen from a.
-    #[inline]
+    #[inline(always)]
     fn mul(self, point_in_b: Point) -> Point {
         Point {
             x_m: self.a_from_b.x_m + self.cos * point_in_b.x_m - self.sin * point_in_b.y_m,

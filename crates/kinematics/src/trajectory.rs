@@ -2,6 +2,8 @@
 //!
 //! The bits are those of [`DeadReckoning::update`] row by row; `whole_log.rs` finds them by blocks.
 
+use crate::dead_reckoning::{CompensatedSum, GROUP, heading_rad};
+use crate::elementary::{Elementary, Formula, by_lanes};
 use crate::whole_log::{self, Every, Last, Rows};
 use crate::{Count, DeadReckoning, InstructionSet, Odometry, OdometryCovariance, Pose, WheelNoise, Wheels};
 
@@ -54,6 +56,55 @@ impl Odometry {
     pub fn final_pose<C: Count>(&self, start: Pose, counts: Wheels<&[C]>) -> Pose {
         let Some((state, steps)) = self.first_row(start, counts) else { return start };
         whole_log::walk(InstructionSet::widest(), state, steps, Last).world_from_body()
+    }
+
+    /// [`Self::final_pose`] of W logs side by side, by the midpoint rule whatever the rule is: `counts` row
+    /// by row, cumulative, of every lane.
+    #[inline(always)]
+    #[must_use]
+    pub fn final_midpoint_poses<const W: usize>(
+        &self,
+        start: Pose,
+        counts: impl Iterator<Item = Wheels<[f64; W]>>,
+    ) -> [Pose; W] {
+        let mut step = MidpointStep {
+            odometry: self,
+            rad_per_count: self.rad_per_count(),
+            start_theta_rad: start.theta_rad,
+            first: Wheels::both([0.0; W]),
+            before: Wheels::both([0.0; W]),
+            now: Wheels::both([0.0; W]),
+            theta_rad: [start.theta_rad; W],
+        };
+        let mut places = [[start.x_m, start.y_m].map(CompensatedSum::at); W];
+        let mut moved_m = [[0.0; W]; 2];
+        for (row, counts) in counts.enumerate() {
+            if row == 0 {
+                (step.first, step.before) = (counts, counts);
+                continue;
+            }
+            step.now = counts;
+            let [dx_m, dy_m, theta_rad] = by_lanes(&step);
+            for (moved_m, step_m) in moved_m.iter_mut().zip([dx_m, dy_m]) {
+                for lane in 0..W {
+                    moved_m[lane] += step_m[lane];
+                }
+            }
+            (step.before, step.theta_rad) = (counts, theta_rad);
+            if row % GROUP == 0 {
+                for (lane, place) in places.iter_mut().enumerate() {
+                    for (place, moved_m) in place.iter_mut().zip(&mut moved_m) {
+                        place.moved_m = std::mem::take(&mut moved_m[lane]);
+                        place.drop_anchor();
+                    }
+                }
+            }
+        }
+        let pose = |lane: usize| {
+            let [x, y] = &places[lane];
+            Pose::new(x.after_m(moved_m[0][lane]), y.after_m(moved_m[1][lane]), step.theta_rad[lane])
+        };
+        std::array::from_fn(pose)
     }
 
     /// The poses at some rows of a log, nothing else being stored: `rows` count from 0 and do not fall.
@@ -132,6 +183,34 @@ impl Odometry {
             self.start(start, Wheels { left: *left, right: *right }),
             Wheels { left: later_left, right: later_right },
         ))
+    }
+}
+
+/// A step of dead reckoning in lanes.
+struct MidpointStep<'o, const W: usize> {
+    odometry: &'o Odometry,
+    rad_per_count: Wheels<f64>,
+    start_theta_rad: f64,
+    first: Wheels<[f64; W]>,
+    before: Wheels<[f64; W]>,
+    now: Wheels<[f64; W]>,
+    theta_rad: [f64; W],
+}
+
+impl<const W: usize> Formula<3> for MidpointStep<'_, W> {
+    /// Displacement along x and y, and the new heading: the arithmetic of [`DeadReckoning::update`].
+    #[inline(always)]
+    fn of<E: Elementary>(&self, lane: usize, elementary: &E) -> [f64; 3] {
+        let at = |wheels: &Wheels<[f64; W]>| Wheels { left: wheels.left[lane], right: wheels.right[lane] };
+        let (first, before, now) = (at(&self.first), at(&self.before), at(&self.now));
+        let m_per_count = self.odometry.m_per_count;
+        let distance_m =
+            0.5 * (m_per_count.right * (now.right - before.right) + m_per_count.left * (now.left - before.left));
+        let (left, right) = (now.left - first.left, now.right - first.right);
+        let theta_rad = heading_rad(self.start_theta_rad, self.rad_per_count, left, right);
+        let half_turn_rad = 0.5 * (theta_rad - self.theta_rad[lane]);
+        let [dx_m, dy_m] = elementary.along(self.theta_rad[lane] + half_turn_rad, distance_m);
+        [dx_m, dy_m, theta_rad]
     }
 }
 

@@ -12,7 +12,7 @@ use std::f64::consts::{FRAC_1_PI, FRAC_2_PI, FRAC_PI_4};
 
 /// Up to here an argument is reduced in-house, radians: its multiple of π/2 is under 2²⁰, and 2²⁰ times a
 /// part of 33 bits is exact.
-const LARGEST_RAD: f64 = 1e6;
+pub(crate) const LARGEST_RAD: f64 = 1e6;
 
 /// π/2 in three parts, the first two of 33 bits (fdlibm, `e_rem_pio2.c`).
 const HALF_PI: [f64; 3] = [1.570_796_326_734_125_6, 6.077_100_506_303_966e-11, 2.022_266_248_795_950_6e-21];
@@ -95,7 +95,7 @@ const ARCTANGENT: [[f64; 6]; 2] = [
 ];
 
 /// Up to this tangent [`atan2`] is the polynomial.
-const LARGEST_TANGENT: f64 = 7.0 / 16.0;
+pub(crate) const LARGEST_TANGENT: f64 = 7.0 / 16.0;
 
 /// c₀ + c₁x + c₂x² + …, in pairs that do not wait for each other (Estrin).
 #[inline(always)]
@@ -106,7 +106,7 @@ fn polynomial([c0, c1, c2, c3, c4, c5]: [f64; 6], x: f64) -> f64 {
 
 /// sin x / x up to π/4.
 #[inline(always)]
-fn small_sinc(x: f64) -> f64 {
+pub(crate) fn small_sinc(x: f64) -> f64 {
     let xx = x * x;
     1.0 + xx * polynomial(SINE, xx)
 }
@@ -119,8 +119,8 @@ fn small(x: f64) -> (f64, f64) {
 }
 
 /// Sine and cosine up to [`LARGEST_RAD`].
-#[inline]
-fn reduced(x: f64) -> (f64, f64) {
+#[inline(always)]
+pub(crate) fn reduced(x: f64) -> (f64, f64) {
     let shifted = x * FRAC_2_PI + SHIFTER;
     let (quarter, quarters) = (shifted.to_bits(), shifted - SHIFTER);
     // Both products are exact; the second difference rounds, and what it dropped goes in with the third part.
@@ -240,10 +240,13 @@ pub fn sinc(x: f64) -> f64 {
     if x.abs() <= FRAC_PI_4 { small_sinc(x) } else { sin_cos(x).0 / x }
 }
 
-/// [`sinc`] where the sine of `x` is at hand already.
-#[inline]
-pub(crate) fn sinc_given_sine(x: f64, sine: f64) -> f64 {
-    if x.abs() <= FRAC_PI_4 { small_sinc(x) } else { sine / x }
+/// Arctangent up to [`LARGEST_TANGENT`].
+#[inline(always)]
+pub(crate) fn arctangent(tangent: f64) -> f64 {
+    let square = tangent * tangent;
+    let [low, high] = ARCTANGENT.map(|half| polynomial(half, square));
+    let sixth = square * square * square * (square * square * square);
+    tangent - tangent * square * (low + sixth * high)
 }
 
 /// Angle of the vector (x, y) from the x axis, radians in [−π, π]: [`f64::atan2`], faster where the angle is
@@ -253,11 +256,8 @@ pub(crate) fn sinc_given_sine(x: f64, sine: f64) -> f64 {
 pub fn atan2(y: f64, x: f64) -> f64 {
     let tangent = y / x;
     if x > 0.0 && tangent.abs() <= LARGEST_TANGENT {
-        let square = tangent * tangent;
-        let [low, high] = ARCTANGENT.map(|half| polynomial(half, square));
-        let sixth = square * square * square * (square * square * square);
         // The sign is that of a zero, too.
-        (tangent - tangent * square * (low + sixth * high)).copysign(y)
+        arctangent(tangent).copysign(y)
     } else {
         y.atan2(x)
     }

@@ -48,13 +48,14 @@ impl<T> Wheels<T> {
         Self { left: value(Side::Left), right: value(Side::Right) }
     }
 
-    #[inline(always)]
     /// Applies `f` to each wheel's value.
+    #[inline(always)]
     pub fn map<U>(self, mut f: impl FnMut(T) -> U) -> Wheels<U> {
         Wheels { left: f(self.left), right: f(self.right) }
     }
 
     /// Combines two pairs wheel by wheel.
+    #[inline(always)]
     pub fn zip_with<U, V>(self, other: Wheels<U>, mut f: impl FnMut(T, U) -> V) -> Wheels<V> {
         Wheels { left: f(self.left, other.left), right: f(self.right, other.right) }
     }

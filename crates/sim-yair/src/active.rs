@@ -1,6 +1,6 @@
 //! The effects at work in a simulated robot, each called at the stages at which it acts and at no other.
 
-use effects::{Command, Forward, PoseReading, Readout, RunStart, SampleClock, Step, StreamName};
+use effects::{Command, Forward, LaneForm, PoseReading, Readout, RunStart, SampleClock, Step, StreamName};
 
 /// Effects in the order in which they act.
 pub(crate) struct ActiveEffects {
@@ -96,6 +96,12 @@ impl ActiveEffects {
         clock(sample: SampleClock);
         /// What the outside sees.
         instrument(reading: PoseReading);
+    }
+
+    /// What the effects do where trials are driven side by side, each with its stream's name; `None` when one
+    /// must be asked trial by trial.
+    pub(crate) fn lane_forms(&self) -> Option<Vec<(StreamName, LaneForm)>> {
+        self.effects.iter().map(|(name, effect)| Some((*name, effect.lane_form()?))).collect()
     }
 
     /// Is a motion told and counted the same way at every trial, whatever is drawn?

@@ -6,7 +6,7 @@ use dataset::{
     WheelSpeed,
 };
 use effects::{Address, Stream, StreamName};
-use kinematics::{Frame, Point, Pose, Wheels, wrap_to_pi};
+use kinematics::{Branching, Elementary, Frame, Point, Pose, Wheels, wrap_to_pi};
 use scenario::{Instrument, Slam, Wall};
 
 use crate::slam::SlamErrors;
@@ -64,6 +64,21 @@ impl Observer {
 
     pub(crate) const fn instrument(&self) -> &Instrument {
         &self.instrument
+    }
+
+    /// The name of its stream.
+    pub(crate) const fn name(&self) -> StreamName {
+        self.name
+    }
+
+    /// The floor grid that it reads marks on, where it is one.
+    pub(crate) const fn floor_grid(&self) -> Option<FloorGrid> {
+        match self.instrument {
+            Instrument::FloorGrid { resolution_m, reading_sigma_m } => {
+                Some(FloorGrid { resolution_m, reading_sigma_m })
+            }
+            _ => None,
+        }
     }
 
     /// Another run begins, the first of a session or a later one; its draws come from `stream`.
@@ -267,55 +282,39 @@ impl Observer {
         points: &[MarkedPoint],
         readings: &mut Vec<PointReading>,
     ) {
-        let Instrument::FloorGrid { resolution_m, reading_sigma_m } = self.instrument else { return };
+        let Some(grid) = self.floor_grid() else { return };
         readings.reserve(points.len());
         for (point, mark) in points.iter().enumerate() {
-            let room = world_from_body * mark.body;
-            let [dx, dy] = self.stream.normals();
-            let read_m = [room.x_m + reading_sigma_m * dx, room.y_m + reading_sigma_m * dy];
-            let [x_m, y_m] = if resolution_m > 0.0 {
-                round(read_m.map(|m| m / resolution_m)).map(|m| m * resolution_m)
-            } else {
-                read_m
-            };
+            let [x_m, y_m] = grid.reading(&Branching, world_from_body * mark.body, self.stream.normals());
             let room = Point::new(x_m, y_m);
             readings.push(PointReading { t_s, point, room });
         }
     }
 }
 
-/// [`f64::round`] of each, the same bits without the calls that they are where the processor is not known to
-/// round by an instruction (SSE 4.1).
-#[inline]
-fn round(numbers: [f64; 2]) -> [f64; 2] {
-    /// 1.5·2⁵²: added and taken away again it rounds to whole numbers, halves to even ones.
-    const SHIFTER: f64 = 6_755_399_441_055_744.0;
-    /// Below this the sum with the shifter has no fractions and does not leave its binade.
-    const SHIFTS_BELOW: f64 = 1_125_899_906_842_624.0; // 2⁵⁰
-    let rounded = numbers.map(|x| (x + SHIFTER) - SHIFTER);
-    let rounds = |k: usize| numbers[k].abs() < SHIFTS_BELOW && (numbers[k] - rounded[k]).abs() < 0.5;
-    if rounds(0) && rounds(1) {
-        [rounded[0].copysign(numbers[0]), rounded[1].copysign(numbers[1])]
-    } else {
-        numbers.map(f64::round)
-    }
+/// A floor grid that marks are read on.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FloorGrid {
+    pub(crate) resolution_m: f64,
+    pub(crate) reading_sigma_m: f64,
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rounding_is_that_of_the_standard_library_to_the_bit() {
-        let halves = (-9..=9).map(|half| 0.5 * f64::from(half));
-        let large =
-            [2_f64.powi(50), 2_f64.powi(50) - 0.5, 2_f64.powi(51) + 0.5, 2_f64.powi(52) + 1.0, 1e300, f64::INFINITY];
-        let small = [0.0, f64::MIN_POSITIVE, 0.499_999_999_999_999_94, 1e-9, 0.3, 1234.567];
-        for x in halves.chain(large).chain(small).flat_map(|x| [x, -x, x.next_up(), x.next_down()]) {
-            for pair in [[x, 0.3], [0.3, x], [x, x]] {
-                assert_eq!(round(pair).map(f64::to_bits), pair.map(|x| x.round().to_bits()), "{x}");
-            }
+impl FloorGrid {
+    /// A mark as read, x and y in metres, by two draws.
+    #[inline(always)]
+    pub(crate) fn reading(&self, elementary: &impl Elementary, room: Point, [dx, dy]: [f64; 2]) -> [f64; 2] {
+        let read_m = [room.x_m + self.reading_sigma_m * dx, room.y_m + self.reading_sigma_m * dy];
+        if self.resolution_m > 0.0 {
+            let [x_m, y_m] = read_m;
+            [self.nearest_m(elementary, x_m), self.nearest_m(elementary, y_m)]
+        } else {
+            read_m
         }
-        assert!(round([f64::NAN, 1.0])[0].is_nan());
+    }
+
+    /// A coordinate's nearest line of the grid, metres.
+    #[inline(always)]
+    fn nearest_m(&self, elementary: &impl Elementary, m: f64) -> f64 {
+        elementary.round(m / self.resolution_m) * self.resolution_m
     }
 }

@@ -13,6 +13,7 @@ mod body;
 mod drive;
 mod hctl1100;
 mod instrument;
+mod lanes;
 mod motor;
 mod planned_motion;
 mod precomputed_run;
@@ -25,6 +26,7 @@ mod simulation;
 mod slam;
 
 pub use instrument::{MIN_RETURN_TURN_RAD, TAPE_FROM_M};
+pub use lanes::LaneDrive;
 pub use prepared_program::PreparedProgram;
 pub use robot::{SimulatedRobot, SimulationError};
 pub use servo::ServoError;

@@ -17,21 +17,21 @@ use crate::planned_motion::PlannedMotion;
 
 /// What a run does from one standstill to the next.
 #[derive(Debug, Clone)]
-struct RowInterval {
+pub(crate) struct RowInterval {
     /// Does it begin a motion, for which effects and sensitivities draw?
-    sets_out: bool,
-    segments: Vec<RateSegment>,
+    pub(crate) sets_out: bool,
+    pub(crate) segments: Vec<RateSegment>,
     /// Is the standing robot read?
-    is_read: bool,
+    pub(crate) is_read: bool,
 }
 
 /// A precomputed run.
 #[derive(Debug, Clone)]
 pub(crate) struct PrecomputedRun {
     /// Each ends with a row.
-    intervals: Vec<RowInterval>,
+    pub(crate) intervals: Vec<RowInterval>,
     /// When, seconds.
-    rows_s: Vec<f64>,
+    pub(crate) rows_s: Vec<f64>,
 }
 
 impl PrecomputedRun {

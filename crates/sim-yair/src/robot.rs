@@ -13,6 +13,7 @@ use crate::actuator::{Actuator, ConstantSpeed, Profile, ServoPair};
 use crate::body::{DriveSetup, DriveStreams, Start};
 use crate::drive::Drive;
 use crate::instrument::Observer;
+use crate::lanes::{LaneDrive, RobotStreams};
 use crate::planned_motion::PlannedMotion;
 use crate::precomputed_run::PrecomputedRun;
 use crate::prepared_program::PreparedProgram;
@@ -199,6 +200,39 @@ impl SimulatedRobot {
             None
         };
         PreparedProgram { program, motions, precomputed_run }
+    }
+
+    /// The trials of these programs side by side, from any trial's first run on; `None` where trials must be
+    /// driven one by one.
+    #[must_use]
+    pub fn lane_drive(&self, programs: &[PreparedProgram]) -> Option<LaneDrive> {
+        if self.setup.sensitivity_sigma > 0.0 {
+            return None;
+        }
+        let grids = self.observers.iter().map(|observer| Some((observer.name(), observer.floor_grid()?)));
+        let mut session_s = 0.0;
+        let runs = programs.iter().map(|PreparedProgram { program, precomputed_run, .. }| {
+            let run = precomputed_run.clone()?;
+            let info = RunInfo {
+                id: program.id.clone(),
+                protocol: Some(program.protocol),
+                settings: program.settings,
+                start_s: Some(session_s),
+                ..RunInfo::default()
+            };
+            session_s += run.rows_s.last().copied().unwrap_or_default();
+            Some((info, run))
+        });
+        Some(LaneDrive {
+            setup: self.setup.clone(),
+            placement: self.placement,
+            counts_per_turn: self.robot.encoder.counts_per_wheel_turn(),
+            streams: RobotStreams { placement: PLACEMENT, wheel_phase: WHEEL_PHASE, wheel_noise: WHEEL_NOISE },
+            effects: self.effects.lane_forms()?,
+            grids: grids.collect::<Option<_>>()?,
+            runs: runs.collect::<Option<_>>()?,
+            address: Address { run: 0, ..self.address },
+        })
     }
 
     /// Drives a program as [`Platform::drive_into`] does.

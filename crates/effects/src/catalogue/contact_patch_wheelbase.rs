@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::benchmark::Benchmark;
 use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
-use crate::forward::{Forward, Hooks, Step};
+use crate::forward::{Forward, Hooks, LaneForm, Step};
 use crate::hypothesis::{Hypothesis, Sign, value_of};
 use crate::on_board::{Code, IntervalScatter, OnBoard, Scatter, ScatterModel};
 use crate::stream::Stream;
@@ -163,6 +163,11 @@ impl Forward for State {
             self.slow_m = kept * self.slow_m + self.effect.slow_sigma_m * (1.0 - kept * kept).sqrt() * stream.normal();
         }
         step.wheel_separation_m += self.motion_m + self.slow_m;
+    }
+
+    fn lane_form(&self) -> Option<LaneForm> {
+        let is_drawn_per_motion = self.effect.slow_sigma_m == 0.0;
+        is_drawn_per_motion.then_some(LaneForm::SeparationPerMotion { sigma_m: self.effect.sigma_m })
     }
 
     fn needs_stepping(&self) -> Option<&'static str> {

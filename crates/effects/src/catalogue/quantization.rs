@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
-use crate::forward::{Forward, Hooks, Readout};
+use crate::forward::{Forward, Hooks, LaneForm, Readout};
 use crate::hypothesis::{Hypothesis, value_of};
 use crate::on_board::{Code, IntervalScatter, OnBoard, Scatter, ScatterModel};
 
@@ -86,6 +86,10 @@ impl Forward for State {
 
     fn readout(&mut self, readout: &mut Readout) {
         readout.ticks = readout.ticks.map(|counts| counts.div_euclid(i64::from(self.effect.counts_per_tick)));
+    }
+
+    fn lane_form(&self) -> Option<LaneForm> {
+        Some(LaneForm::Ticks { counts: self.effect.counts_per_tick })
     }
 
     fn counts_per_tick(&self) -> Option<u32> {
