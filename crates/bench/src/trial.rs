@@ -1,15 +1,18 @@
-//! One Monte-Carlo trial: the protocols driven once, into buffers that the next trial uses again.
+//! One Monte-Carlo trial, or several side by side: the protocols driven once, into buffers that the next
+//! trials use again.
 
-use dataset::{Dataset, Run, Session};
+use dataset::{Dataset, Replicates, Run, Session};
 use motion_programs::{MotionProgram, Platform};
 use scenario::Scenario;
-use sim_yair::{PreparedProgram, SimulatedRobot, SimulationError};
+use sim_yair::{LaneDrive, PreparedProgram, SimulatedRobot, SimulationError};
 
 /// A simulated robot with its protocols and the dataset that they fill.
 pub struct Trial {
     robot: SimulatedRobot,
     prepared: Vec<PreparedProgram>,
     dataset: Dataset,
+    /// Trials side by side, where they can be driven so.
+    lanes: Option<(LaneDrive, Replicates)>,
 }
 
 impl Trial {
@@ -39,14 +42,31 @@ impl Trial {
             runs: vec![Run::default(); programs.len()],
         };
         let prepared = programs.into_iter().map(|program| robot.prepare(program)).collect();
-        Ok(Self { robot, prepared, dataset })
+        Ok(Self { robot, prepared, dataset, lanes: None }.with_lanes())
+    }
+
+    fn with_lanes(mut self) -> Self {
+        let drive = self.robot.lane_drive(&self.prepared);
+        self.lanes = drive.map(|drive| {
+            let replicates = drive.replicates(&self.dataset);
+            (drive, replicates)
+        });
+        self
     }
 
     /// The same trial at another point of a sweep's design: other draws.
     #[must_use]
     pub fn at_point(mut self, point: u32) -> Self {
         self.robot = self.robot.at_point(point);
-        self
+        self.with_lanes()
+    }
+
+    /// Drives trial `first` and those that follow it, [`dataset::LANES`] in all, and shows what was measured:
+    /// of each what [`Self::drive`] shows, to the bit. `None` where trials must be driven one by one.
+    pub fn drive_side_by_side(&mut self, first: u64) -> Option<&Replicates> {
+        let (drive, replicates) = self.lanes.as_mut()?;
+        drive.drive_into(first, replicates);
+        Some(replicates)
     }
 
     /// Drives trial number `trial` and shows what was measured.

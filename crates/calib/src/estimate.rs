@@ -1,6 +1,6 @@
 //! What a calibration is: the trait of a method and the form of its result.
 
-use dataset::{NominalRobot, Session};
+use dataset::{LANES, NominalRobot, Replicates, Session};
 use kinematics::{DriveGeometry, GeometryError, Pose, Wheels};
 use motion_programs::Schedule;
 use nalgebra::{DMatrix, Matrix3};
@@ -328,6 +328,12 @@ pub trait Method: Sync + Send {
     /// # Errors
     /// [`CalibError`] when the method does not apply to these sessions, with the reason.
     fn calibrate(&self, sessions: &[Session<'_>]) -> Result<Calibration, CalibError>;
+
+    /// Calibrates every trial of replicates, each by itself as [`Self::calibrate`] does. A method that does
+    /// its arithmetic for all lanes at once gives the same bits.
+    fn calibrate_replicates(&self, replicates: &Replicates) -> Vec<Result<Calibration, CalibError>> {
+        (0..LANES).map(|lane| self.calibrate(&[replicates.dataset(lane).session()])).collect()
+    }
 }
 
 /// The nominal drive of the first session.

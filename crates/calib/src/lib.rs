@@ -18,6 +18,7 @@ mod pose_measurements;
 mod pose_pairs;
 mod report;
 mod robust;
+mod robust_lanes;
 mod settings;
 mod stated;
 mod trained_on;

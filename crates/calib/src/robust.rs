@@ -36,11 +36,21 @@ impl MedianMad {
         }
         let sorted = sorted(values);
         let center = median(&sorted);
-        let deviation = median_deviation(&sorted, center);
-        let limit = self.cut * (MAD_TO_SIGMA * deviation).max(stated_sigma);
-        // A limit of zero: half of the values agree exactly, and nothing bounds the rest.
-        values.iter().map(|value| limit == 0.0 || (value - center).abs() <= limit).collect()
+        let limit = self.limit(median_deviation(&sorted, center), stated_sigma);
+        values.iter().map(|value| is_within(*value, center, limit)).collect()
     }
+
+    /// Distance from the median beyond which a value is an outlier.
+    #[inline(always)]
+    pub(crate) fn limit(&self, median_deviation: f64, stated_sigma: f64) -> f64 {
+        self.cut * (MAD_TO_SIGMA * median_deviation).max(stated_sigma)
+    }
+}
+
+/// Is a value no outlier? A limit of zero: half of the values agree exactly, and nothing bounds the rest.
+#[inline(always)]
+pub(crate) fn is_within(value: f64, center: f64, limit: f64) -> bool {
+    (limit == 0.0) | ((value - center).abs() <= limit)
 }
 
 /// The values in the order of [`f64::total_cmp`].

@@ -1,7 +1,7 @@
 //! Borrowed views of a dataset: what estimators take. A subset of the runs (training, held out) copies
 //! nothing.
 
-use kinematics::{Count, Odometry as DeadReckoner, Point, Pose, Rule, Wheels, atan2, unwrap_near};
+use kinematics::{Branching, Count, Elementary, Frame, Odometry as DeadReckoner, Point, Pose, Rule, Wheels, unwrap_near};
 
 use crate::record::{Dataset, MarkedPoint, NominalRobot, Odometry, Run, RunInfo, TruthNoise, WheelLog};
 
@@ -248,14 +248,24 @@ impl<'a> RunView<'a> {
 /// `room_from_body` that carries body points onto room points with the least squared error; `None` for fewer
 /// than two distinct points.
 fn fit_rigid(pairs: impl Iterator<Item = (Point, Point)> + Clone) -> Option<Pose> {
+    let [x_m, y_m, theta_rad] = fit_rigid_by(&Branching, pairs);
+    // NaN where there is none.
+    (!theta_rad.is_nan()).then_some(Pose::new(x_m, y_m, theta_rad))
+}
+
+/// The pose `room_from_body` (x, y, heading) that carries body points onto room points with the least squared
+/// error, by given elementary functions; NaN for fewer than two distinct points.
+#[inline(always)]
+#[must_use]
+pub fn fit_rigid_by<E: Elementary>(
+    elementary: &E,
+    pairs: impl Iterator<Item = (Point, Point)> + Clone,
+) -> [f64; 3] {
     let (mut count, mut body, mut room) = (0.0, Point::default(), Point::default());
     for (b, r) in pairs.clone() {
         count += 1.0;
         body = Point::new(body.x_m + b.x_m, body.y_m + b.y_m);
         room = Point::new(room.x_m + r.x_m, room.y_m + r.y_m);
-    }
-    if count < 2.0 {
-        return None;
     }
     let body = Point::new(body.x_m / count, body.y_m / count);
     let room = Point::new(room.x_m / count, room.y_m / count);
@@ -266,12 +276,13 @@ fn fit_rigid(pairs: impl Iterator<Item = (Point, Point)> + Clone) -> Option<Pose
         dot += bx * rx + by * ry;
         cross += bx * ry - by * rx;
     }
-    if dot == 0.0 && cross == 0.0 {
-        return None;
-    }
-    let theta_rad = atan2(cross, dot);
-    let turned = Pose::new(0.0, 0.0, theta_rad) * body;
-    Some(Pose::new(room.x_m - turned.x_m, room.y_m - turned.y_m, theta_rad))
+    let theta_rad = elementary.atan2(cross, dot);
+    let turned = Frame::by(elementary, Pose::new(0.0, 0.0, theta_rad)) * body;
+    E::choose(
+        (count < 2.0) | ((dot == 0.0) & (cross == 0.0)),
+        || [f64::NAN; 3],
+        || [room.x_m - turned.x_m, room.y_m - turned.y_m, theta_rad],
+    )
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
 //! A sweep ready to run: the points of its design, who estimates at each of them from what, and one chunk of
 //! trials at a time.
 
-use calib::{Method, Parameter, method};
+use calib::{Calibration, Method, Parameter, method};
+use dataset::LANES;
 use motion_programs::MotionProgram;
 use scenario::{Point, Scenario};
 
@@ -236,6 +237,37 @@ struct Group {
     methods: Vec<usize>,
 }
 
+impl Group {
+    /// Drives trials and calibrates each by every method, side by side where that can be; `take` gets trial,
+    /// method and calibration, a method's in the order of trials.
+    fn calibrate(
+        &mut self,
+        plan: &SweepPlan,
+        trials: std::ops::Range<u64>,
+        mut take: impl FnMut(u64, usize, Option<Calibration>),
+    ) -> Result<(), BenchError> {
+        for first in trials.clone().step_by(LANES) {
+            let block = first..trials.end.min(first + LANES as u64);
+            if let Some(replicates) = self.trial.drive_side_by_side(first) {
+                for &number in &self.methods {
+                    let calibrations = plan.methods[number].calibrate_replicates(replicates);
+                    for (trial, calibration) in block.clone().zip(calibrations) {
+                        take(trial, number, calibration.ok());
+                    }
+                }
+                continue;
+            }
+            for trial in block {
+                let session = [self.trial.drive(trial)?];
+                for &number in &self.methods {
+                    take(trial, number, plan.methods[number].calibrate(&session).ok());
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
 /// The bench set up for one point: its robot, what is driven, and for whom.
 pub(super) struct PointSetup {
     point: usize,
@@ -282,27 +314,25 @@ impl PointSetup {
         let (methods, parameters) = (plan.methods.len(), TRACKED.len());
         let mut sum =
             ChunkSum { estimates: vec![Tally::default(); plan.estimates()], drift: vec![Moments::default(); methods] };
-        let mut outcomes = Vec::new();
-        let mut of_trial = vec![Outcome::of(None, TRACKED[0]); plan.estimates()];
-        for trial in first..last {
-            for group in &mut self.groups {
-                let session = [group.trial.drive(trial)?];
-                for &number in &group.methods {
-                    let calibration = plan.methods[number].calibrate(&session).ok();
-                    for (k, parameter) in TRACKED.into_iter().enumerate() {
-                        of_trial[number * parameters + k] = Outcome::of(calibration.as_ref(), parameter);
-                    }
-                    if let (Some(validation), Some(calibration)) = (&self.validation, calibration)
-                        && calibration.converged
-                    {
-                        sum.drift[number].push(validation.drift_percent(&calibration.geometry));
-                    }
+        // Every estimate in the order of trial, method, parameter.
+        let mut outcomes = vec![Outcome::of(None, TRACKED[0]); (last - first) as usize * plan.estimates()];
+        for group in &mut self.groups {
+            group.calibrate(plan, first..last, |trial, number, calibration| {
+                let of_trial = (trial - first) as usize * plan.estimates();
+                for (k, parameter) in TRACKED.into_iter().enumerate() {
+                    outcomes[of_trial + number * parameters + k] = Outcome::of(calibration.as_ref(), parameter);
                 }
-            }
-            for (k, (tally, outcome)) in sum.estimates.iter_mut().zip(&of_trial).enumerate() {
+                if let (Some(validation), Some(calibration)) = (&self.validation, calibration)
+                    && calibration.converged
+                {
+                    sum.drift[number].push(validation.drift_percent(&calibration.geometry));
+                }
+            })?;
+        }
+        for of_trial in outcomes.chunks(plan.estimates().max(1)) {
+            for (k, (tally, outcome)) in sum.estimates.iter_mut().zip(of_trial).enumerate() {
                 tally.take(*outcome, plan.truth[self.point][k % parameters]);
             }
-            outcomes.extend_from_slice(&of_trial);
         }
         Ok(ChunkOutcome { sum, outcomes })
     }

@@ -12,8 +12,10 @@
 //! which folds beyond ±90°.
 //! Reference: Navarro, Benet, Ríos, Bueno, eq. (6)–(9), (12)–(14).
 
-use dataset::{PointReading, Protocol, RunView, Session};
-use kinematics::{DriveGeometry, Point, Side, Wheels, atan2, sinc, unwrap_near};
+mod lanes;
+
+use dataset::{MarkedPoint, NominalRobot, PointReading, Protocol, Replicates, RunView, Session};
+use kinematics::{Branching, DriveGeometry, Elementary, Point, Side, Wheels};
 use motion_programs::Schedule;
 
 use crate::estimate::{CalibError, Calibration, Covariance, Method, Parameter, Rejected, drive, nominal};
@@ -63,22 +65,69 @@ struct Marks {
 
 impl Marks {
     /// Turn between start and end, the multiple of whole turns nearest to `about_rad` (paper, eq. 8 and 14).
-    #[inline]
-    fn turn_rad(&self, about_rad: f64) -> f64 {
-        let axle = |marks: &Wheels<Point>| (marks.left.x_m - marks.right.x_m, marks.left.y_m - marks.right.y_m);
-        let ((x0, y0), (x1, y1)) = (axle(&self.start), axle(&self.end));
-        unwrap_near(atan2(x0 * y1 - y0 * x1, x0 * x1 + y0 * y1), about_rad)
+    #[inline(always)]
+    fn turn_rad(&self, elementary: &impl Elementary, about_rad: f64) -> f64 {
+        let Self { start, end, .. } = self;
+        let (x0, y0) = (start.left.x_m - start.right.x_m, start.left.y_m - start.right.y_m);
+        let (x1, y1) = (end.left.x_m - end.right.x_m, end.left.y_m - end.right.y_m);
+        elementary.unwrap_near(elementary.atan2(x0 * y1 - y0 * x1, x0 * x1 + y0 * y1), about_rad)
     }
+
+    /// Metres per radian of each wheel on a straight run: (6) and (9), signed with the direction of travel,
+    /// as backward runs have negative chords and negative counts.
+    #[inline(always)]
+    fn m_per_rad(&self, elementary: &impl Elementary, wheel_rad: Wheels<f64>) -> Wheels<f64> {
+        let Self { start, end, outside_m } = self;
+        let turn_rad = self.turn_rad(elementary, 0.0);
+        let chord_over_arc = elementary.sinc(0.5 * turn_rad);
+        let left_m = start.left.distance_m(end.left) * wheel_rad.left.signum();
+        let right_m = start.right.distance_m(end.right) * wheel_rad.right.signum();
+        Wheels {
+            left: (left_m / chord_over_arc + outside_m.left * turn_rad) / wheel_rad.left,
+            right: (right_m / chord_over_arc - outside_m.right * turn_rad) / wheel_rad.right,
+        }
+    }
+
+    /// The wheelbase by a spin with its slopes by each wheel's metres per radian, and the robot's turn:
+    /// (14), whole turns by the counts and the sensitivities already found.
+    #[inline(always)]
+    fn spin(
+        &self,
+        elementary: &impl Elementary,
+        geometry: &DriveGeometry,
+        (wheel_rad, m_per_rad): (Wheels<f64>, Wheels<f64>),
+    ) -> Spin {
+        let travel_m = Wheels { left: wheel_rad.left * m_per_rad.left, right: wheel_rad.right * m_per_rad.right };
+        let turn_rad = self.turn_rad(elementary, geometry.increment(travel_m).turn_rad);
+        Spin {
+            turn_rad,
+            wheel_separation_m: (travel_m.right - travel_m.left) / turn_rad,
+            slope: Wheels { left: -wheel_rad.left / turn_rad, right: wheel_rad.right / turn_rad },
+        }
+    }
+}
+
+impl Marks {
+    /// Standard deviation of the wheelbase by a spin, which moves by `by_turn_m` a radian of the robot's
+    /// turn: two marks across the axle, read at both ends, give the turn to 2σ/w.
+    #[inline(always)]
+    fn stated_sigma_m(&self, by_turn_m: f64, mark_sigma_m: f64) -> f64 {
+        by_turn_m.abs() * 2.0 * mark_sigma_m / self.start.left.distance_m(self.start.right)
+    }
+}
+
+/// What a spin gives.
+struct Spin {
+    turn_rad: f64,
+    wheel_separation_m: f64,
+    slope: Wheels<f64>,
 }
 
 impl<'s, 'a> MarkReader<'s, 'a> {
     fn new(session: &'s Session<'a>) -> Result<Self, CalibError> {
         let geometry =
             session.robot.geometry().map_err(|source| CalibError::NotADrive { method: Direct::NAME, source })?;
-        let points = || session.points.iter().map(|point| point.body).enumerate();
-        let by_y = |a: &(usize, Point), b: &(usize, Point)| a.1.y_m.total_cmp(&b.1.y_m);
-        let outermost = points().max_by(by_y).zip(points().min_by(by_y));
-        Ok(Self { session, geometry, outermost: outermost.map(|(left, right)| Wheels { left, right }) })
+        Ok(Self { session, geometry, outermost: outermost(session.points) })
     }
 
     /// The runs of one protocol, each with its wheels' turns and its marks, where both were measured.
@@ -105,12 +154,7 @@ impl<'s, 'a> MarkReader<'s, 'a> {
         }
         let Some(outermost) = self.outermost else { return Ok(None) };
         let body = outermost.map(|(_, body)| body);
-        if body.left.y_m <= 0.0 || body.right.y_m >= 0.0 {
-            return Err(Direct::not_applicable("it needs one marked point on each side of the robot".to_owned()));
-        }
-        if body.left.x_m.abs().max(body.right.x_m.abs()) > MAX_MARK_OFFSET_M {
-            return Err(Direct::not_applicable("its marked points must stand on the axle's line (x_m = 0)".to_owned()));
-        }
+        Direct::check_marks(body)?;
         let start = outermost.map(|(point, _)| readings.iter().find(|reading| reading.point == point));
         let end = outermost.map(|(point, _)| readings.iter().rfind(|reading| reading.point == point));
         let both =
@@ -118,8 +162,33 @@ impl<'s, 'a> MarkReader<'s, 'a> {
         let (Some(start), Some(end)) = (both(start), both(end)) else { return Ok(None) };
         // Marks are read while the robot stands, before and after all that its log has.
         let Some(wheel_rad) = run.wheel_turn_rad(self.session.robot) else { return Ok(None) };
-        let outside_m = Wheels { left: body.left.y_m - half_m, right: -body.right.y_m - half_m };
-        Ok(Some((wheel_rad, Marks { start, end, outside_m })))
+        Ok(Some((wheel_rad, Marks { start, end, outside_m: outside_m(body, half_m) })))
+    }
+}
+
+/// Distance of each mark outside its wheel's contact, metres.
+fn outside_m(body: Wheels<Point>, half_m: f64) -> Wheels<f64> {
+    Wheels { left: body.left.y_m - half_m, right: -body.right.y_m - half_m }
+}
+
+/// The outermost marked points, left and right: which, and where they are on the robot.
+fn outermost(points: &[MarkedPoint]) -> Option<Wheels<(usize, Point)>> {
+    let points = || points.iter().map(|point| point.body).enumerate();
+    let by_y = |a: &(usize, Point), b: &(usize, Point)| a.1.y_m.total_cmp(&b.1.y_m);
+    let ends = points().max_by(by_y).zip(points().min_by(by_y));
+    ends.map(|(left, right)| Wheels { left, right })
+}
+
+impl Direct {
+    /// Refuses marks that (6) does not hold for.
+    fn check_marks(body: Wheels<Point>) -> Result<(), CalibError> {
+        if body.left.y_m <= 0.0 || body.right.y_m >= 0.0 {
+            return Err(Direct::not_applicable("it needs one marked point on each side of the robot".to_owned()));
+        }
+        if body.left.x_m.abs().max(body.right.x_m.abs()) > MAX_MARK_OFFSET_M {
+            return Err(Direct::not_applicable("its marked points must stand on the axle's line (x_m = 0)".to_owned()));
+        }
+        Ok(())
     }
 }
 
@@ -146,17 +215,11 @@ impl Direct {
             let chord_sigma_m = 2_f64.sqrt() * mark_sigma_m(session);
             for measured in MarkReader::new(session)?.runs(Protocol::Straight) {
                 let (run, wheel_rad, marks) = measured?;
-                let turn_rad = marks.turn_rad(0.0);
-                let chord_over_arc = sinc(0.5 * turn_rad);
+                let m_per_rad = marks.m_per_rad(&Branching, wheel_rad);
                 for side in Side::BOTH {
-                    // Signed with the direction of travel: backward runs have negative chords and negative
-                    // counts.
-                    let chord_m = marks.start[side].distance_m(marks.end[side]) * wheel_rad[side].signum();
-                    let outward = if side == Side::Left { 1.0 } else { -1.0 };
-                    let arc_m = chord_m / chord_over_arc + outward * marks.outside_m[side] * turn_rad;
                     if wheel_rad[side] != 0.0 {
                         let stated_sigma = chord_sigma_m / wheel_rad[side].abs();
-                        values[side].push(RunValue { run, value: arc_m / wheel_rad[side], stated_sigma });
+                        values[side].push(RunValue { run, value: m_per_rad[side], stated_sigma });
                     }
                 }
             }
@@ -179,20 +242,21 @@ impl Direct {
             let reader = MarkReader::new(session)?;
             for measured in reader.runs(Protocol::Spin) {
                 let (run, wheel_rad, marks) = measured?;
-                // Whole turns come from the counts and the sensitivities already found.
-                let travel_m = wheel_rad.zip_with(m_per_rad, |rad, m_per_rad| rad * m_per_rad);
-                let turn_rad = marks.turn_rad(reader.geometry.increment(travel_m).turn_rad);
+                let Spin { turn_rad, wheel_separation_m: value, slope } =
+                    marks.spin(&Branching, &reader.geometry, (wheel_rad, m_per_rad));
                 if turn_rad.abs() > MIN_SPIN_RAD {
-                    let value = (travel_m.right - travel_m.left) / turn_rad;
-                    let slope = Wheels { left: -wheel_rad.left / turn_rad, right: wheel_rad.right / turn_rad };
-                    // Two marks across the axle, read at both ends, give the turn to 2σ/w.
-                    let across_m = marks.start.left.distance_m(marks.start.right);
-                    let stated_sigma = (value / turn_rad).abs() * 2.0 * mark_sigma_m / across_m;
+                    let stated_sigma = marks.stated_sigma_m(value / turn_rad, mark_sigma_m);
                     values.push((RunValue { run, value, stated_sigma }, slope));
                 }
             }
         }
         Ok(values)
+    }
+
+    /// An outlier among the values of a quantity.
+    fn rejected(&self, run: &str, of: &str) -> Rejected {
+        let why = format!("{of}: more than {} robust standard deviations from the median", self.outliers.cut);
+        Rejected { run: run.to_owned(), why }
     }
 
     /// Which values are no outliers, and their summary; outliers are added to `rejected`.
@@ -206,8 +270,7 @@ impl Direct {
         let stated_sigma = values.clone().map(|value| value.stated_sigma).fold(0.0, f64::max);
         let keep = self.outliers.keep(&numbers, stated_sigma);
         for (value, _) in values.zip(&keep).filter(|(_, keep)| !**keep) {
-            let why = format!("{of}: more than {} robust standard deviations from the median", self.outliers.cut);
-            rejected.push(Rejected { run: value.run.to_owned(), why });
+            rejected.push(self.rejected(value.run, of));
         }
         let summary = Summary::of(retained(numbers.iter().copied(), &keep));
         (keep, summary)
@@ -271,15 +334,27 @@ impl Method for Direct {
 
         let slope =
             Wheels::from_sides(|side| mean(retained(spins.iter().map(|(_, slope)| slope[side]), &keep)).unwrap_or(0.0));
-        let covariance = covariance(left.mean_variance(), right.mean_variance(), base.mean_variance(), slope);
-        let geometry = drive(Self::NAME, m_per_rad.map(|m_per_rad| 2.0 * m_per_rad), base.mean)?;
-        Ok(Calibration {
-            covariance,
-            runs_used: straights.left.len().max(straights.right.len()) + spins.len(),
-            runs_rejected,
-            ..Calibration::new(Self::NAME, geometry, robot.ticks_per_rev)
-        })
+        let runs_used = straights.left.len().max(straights.right.len()) + spins.len();
+        Ok(Calibration { runs_used, runs_rejected, ..calibration(&robot, Wheels { left, right }, base, slope)? })
     }
+
+    fn calibrate_replicates(&self, replicates: &Replicates) -> Vec<Result<Calibration, CalibError>> {
+        lanes::calibrate(self, replicates)
+    }
+}
+
+/// A calibration by the means of each wheel's metres per radian and of the wheelbase, whose mean moves by
+/// `slope` with them.
+fn calibration(
+    robot: &NominalRobot,
+    m_per_rad: Wheels<Summary>,
+    base: Summary,
+    slope: Wheels<f64>,
+) -> Result<Calibration, CalibError> {
+    let Wheels { left, right } = m_per_rad;
+    let covariance = covariance(left.mean_variance(), right.mean_variance(), base.mean_variance(), slope);
+    let geometry = drive(Direct::NAME, m_per_rad.map(|m_per_rad| 2.0 * m_per_rad.mean), base.mean)?;
+    Ok(Calibration { covariance, ..Calibration::new(Direct::NAME, geometry, robot.ticks_per_rev) })
 }
 
 /// Covariance of both diameters and the base: the base inherits the radii's errors through `slope` and has
@@ -307,7 +382,7 @@ fn covariance(left: Option<f64>, right: Option<f64>, base: Option<f64>, slope: W
 #[cfg(test)]
 mod tests {
     use super::*;
-    use kinematics::{Increment, Pose};
+    use kinematics::{Increment, Pose, sinc};
 
     fn marks_after(increment: Increment, outside_m: Wheels<f64>) -> Marks {
         let half_m = 0.5 * 0.363;
@@ -327,7 +402,7 @@ mod tests {
             for turn_rad in [0.0, 0.02, -0.02] {
                 let increment = Increment { distance_m, turn_rad };
                 let marks = marks_after(increment, outside_m);
-                let measured_rad = marks.turn_rad(0.0);
+                let measured_rad = marks.turn_rad(&Branching, 0.0);
                 assert!((measured_rad - turn_rad).abs() < 1e-14);
                 let arc_m =
                     Wheels { left: distance_m - 0.5 * 0.363 * turn_rad, right: distance_m + 0.5 * 0.363 * turn_rad };
@@ -358,7 +433,7 @@ mod tests {
     fn paper_eq_8_and_14_do_not_fold_and_hold_both_ways_round() {
         for turn_rad in [2.0, -2.0, 6.49, -6.49, 12.6] {
             let marks = marks_after(Increment { distance_m: 0.001, turn_rad }, Wheels::both(0.05));
-            assert!((marks.turn_rad(turn_rad * 0.97) - turn_rad).abs() < 1e-13, "{turn_rad}");
+            assert!((marks.turn_rad(&Branching, turn_rad * 0.97) - turn_rad).abs() < 1e-13, "{turn_rad}");
         }
     }
 }

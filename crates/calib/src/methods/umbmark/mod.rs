@@ -12,10 +12,12 @@
 //! wrong wheelbase: measure the scale first.
 //! Reference: Borenstein & Feng 1995 (UMBmark), 1996 (eq. for E_b and E_d; b is the nominal wheelbase).
 
+mod lanes;
+
 use std::f64::consts::FRAC_PI_2;
 
-use dataset::{Protocol, Session};
-use kinematics::{Pose, Rule, Wheels};
+use dataset::{NominalRobot, Protocol, Replicates, Session};
+use kinematics::{DriveGeometry, Pose, Rule, Wheels};
 use motion_programs::Schedule;
 use nalgebra::{Matrix2, Matrix3x2};
 
@@ -122,6 +124,23 @@ impl Method for Umbmark {
                 "it needs squares in both directions (protocol = \"square_cw\" and \"square_ccw\") with the pose measured at both ends",
             ));
         };
+        self.calibration(&robot, &geometry, side_m, (cw, ccw))
+    }
+
+    fn calibrate_replicates(&self, replicates: &Replicates) -> Vec<Result<Calibration, CalibError>> {
+        lanes::calibrate(self, replicates)
+    }
+}
+
+impl Umbmark {
+    /// A calibration by the end errors of both directions.
+    fn calibration(
+        &self,
+        robot: &NominalRobot,
+        geometry: &DriveGeometry,
+        side_m: f64,
+        (cw, ccw): (Direction, Direction),
+    ) -> Result<Calibration, CalibError> {
         let corner = corner_errors(self.form, side_m, cw, ccw);
         let base_m = geometry.wheel_separation_m();
         let mean_m = 0.5 * (geometry.wheel_diameter_m().left + geometry.wheel_diameter_m().right);

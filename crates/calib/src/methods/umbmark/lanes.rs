@@ -1,0 +1,163 @@
+//! `umbmark` for trials side by side: the same formulas in loops over lanes.
+
+use dataset::{LANES, MarkedPoint, Protocol, ReplicatedReading, ReplicatedRun, Replicates, fit_rigid_by};
+use kinematics::{
+    DriveGeometry, Elementary, Formula, Frame, InstructionSet, Kernel, Odometry, Point, Pose, Rule, Wheels, by_lanes,
+};
+
+use super::{Direction, Umbmark};
+use crate::estimate::{CalibError, Calibration, Method};
+use crate::robust_lanes::{RetainedLanes, SummaryLanes};
+
+/// Calibrates every trial.
+pub(super) fn calibrate(method: &Umbmark, replicates: &Replicates) -> Vec<Result<Calibration, CalibError>> {
+    let lanes = InputLanes::of(replicates).map(|input| (InstructionSet::widest().run(EndErrors(&input)), input));
+    let calibrated = |lane: usize| match &lanes {
+        Some(([cw, ccw], input)) if cw.is_finite(lane) && ccw.is_finite(lane) => {
+            method.calibration(&replicates.robot, &input.geometry, input.side_m, (cw.of(lane), ccw.of(lane)))
+        }
+        _ => method.calibrate(&[replicates.dataset(lane).session()]),
+    };
+    (0..LANES).map(calibrated).collect()
+}
+
+/// What the method looks at.
+struct InputLanes<'r, const W: usize> {
+    geometry: DriveGeometry,
+    odometry: Odometry,
+    points: &'r [MarkedPoint],
+    side_m: f64,
+    /// Squares clockwise and counter-clockwise.
+    squares: [Vec<SquareLanes<'r, W>>; 2],
+}
+
+/// A square with the marks read at its start and at its end.
+struct SquareLanes<'r, const W: usize> {
+    ticks: &'r [Wheels<[f64; W]>],
+    start: &'r [ReplicatedReading<W>],
+    end: &'r [ReplicatedReading<W>],
+}
+
+impl<'r, const W: usize> InputLanes<'r, W> {
+    /// `None` where every trial is to be looked at by itself.
+    fn of(replicates: &'r Replicates<W>) -> Option<Self> {
+        let geometry = replicates.robot.geometry().ok()?;
+        let m_per_count = geometry.m_per_count(replicates.robot.ticks_per_rev?).ok()?;
+        let odometry =
+            Odometry { m_per_count, wheel_separation_m: geometry.wheel_separation_m(), rule: Rule::Midpoint };
+        let squares = |protocol| {
+            let runs = replicates.runs.iter().filter(move |run| run.info.protocol == Some(protocol));
+            runs.map(SquareLanes::of).collect::<Option<Vec<_>>>().filter(|squares| !squares.is_empty())
+        };
+        let is_square = |run: &&ReplicatedRun<W>| {
+            matches!(run.info.protocol, Some(Protocol::SquareCw | Protocol::SquareCcw))
+        };
+        let mut sides = replicates.runs.iter().filter(is_square).map(|run| run.info.settings.side_m);
+        let side_m = sides.next()??;
+        if sides.any(|other| other != Some(side_m)) {
+            return None;
+        }
+        let squares = [squares(Protocol::SquareCw)?, squares(Protocol::SquareCcw)?];
+        Some(Self { geometry, odometry, points: &replicates.points, side_m, squares })
+    }
+}
+
+impl<'r, const W: usize> SquareLanes<'r, W> {
+    /// `None` where a pose is not read at two instants.
+    fn of(run: &'r ReplicatedRun<W>) -> Option<Self> {
+        let mut instants = run.point_readings.chunk_by(|a, b| a.t_s == b.t_s);
+        let (start, end) = (instants.next()?, instants.next_back()?);
+        (!run.ticks.is_empty()).then_some(Self { ticks: &run.ticks, start, end })
+    }
+}
+
+/// Where a square ended, seen from its start, by the marks.
+struct MeasuredEnd<'i, 'r, const W: usize> {
+    square: &'i SquareLanes<'r, W>,
+    points: &'r [MarkedPoint],
+}
+
+impl<const W: usize> Formula<2> for MeasuredEnd<'_, '_, W> {
+    #[inline(always)]
+    fn of<E: Elementary>(&self, lane: usize, elementary: &E) -> [f64; 2] {
+        let [x_m, y_m, theta_rad] = fit_rigid_by(elementary, Pairs::of(self.square.start, self.points, lane));
+        let [end_x_m, end_y_m, _] = fit_rigid_by(elementary, Pairs::of(self.square.end, self.points, lane));
+        let start_from_world = Frame::by(elementary, Pose::new(x_m, y_m, theta_rad)).inverse();
+        let end = start_from_world * Point { x_m: end_x_m, y_m: end_y_m };
+        [end.x_m, end.y_m]
+    }
+}
+
+/// Marks on the robot and as one trial read them in the room.
+#[derive(Clone)]
+struct Pairs<'r, const W: usize> {
+    readings: &'r [ReplicatedReading<W>],
+    points: &'r [MarkedPoint],
+    lane: usize,
+}
+
+impl<'r, const W: usize> Pairs<'r, W> {
+    #[inline(always)]
+    const fn of(readings: &'r [ReplicatedReading<W>], points: &'r [MarkedPoint], lane: usize) -> Self {
+        Self { readings, points, lane }
+    }
+}
+
+impl<const W: usize> Iterator for Pairs<'_, W> {
+    type Item = (Point, Point);
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<(Point, Point)> {
+        let (reading, later) = self.readings.split_first()?;
+        self.readings = later;
+        Some((self.points[reading.point].body, reading.room(self.lane)))
+    }
+}
+
+/// End errors of the squares of one direction.
+struct DirectionLanes<const W: usize> {
+    x_m: SummaryLanes<W>,
+    y_m: SummaryLanes<W>,
+}
+
+impl<const W: usize> DirectionLanes<W> {
+    fn is_finite(&self, lane: usize) -> bool {
+        self.x_m.mean[lane].is_finite() && self.y_m.mean[lane].is_finite()
+    }
+
+    fn of(&self, lane: usize) -> Direction {
+        Direction { x_m: self.x_m.of(lane), y_m: self.y_m.of(lane) }
+    }
+}
+
+/// The work on all lanes: end errors, clockwise and counter-clockwise.
+struct EndErrors<'i, 'r, const W: usize>(&'i InputLanes<'r, W>);
+
+impl<const W: usize> Kernel for EndErrors<'_, '_, W> {
+    type Output = [DirectionLanes<W>; 2];
+
+    #[inline(always)]
+    fn call(self) -> [DirectionLanes<W>; 2] {
+        let [cw, ccw] = &self.0.squares;
+        [self.0.direction(cw), self.0.direction(ccw)]
+    }
+}
+
+impl<const W: usize> InputLanes<'_, W> {
+    #[inline(always)]
+    fn direction(&self, squares: &[SquareLanes<'_, W>]) -> DirectionLanes<W> {
+        let (mut x_m, mut y_m) = (Vec::with_capacity(squares.len()), Vec::with_capacity(squares.len()));
+        for square in squares {
+            // In the start's frame the odometry starts at the origin and the first leg points along +x.
+            let [mut x_error_m, mut y_error_m] = by_lanes(&MeasuredEnd { square, points: self.points });
+            let dead_reckoned = self.odometry.final_midpoint_poses(Pose::IDENTITY, square.ticks.iter().copied());
+            for lane in 0..W {
+                x_error_m[lane] -= dead_reckoned[lane].x_m;
+                y_error_m[lane] -= dead_reckoned[lane].y_m;
+            }
+            x_m.push(x_error_m);
+            y_m.push(y_error_m);
+        }
+        DirectionLanes { x_m: RetainedLanes::all(&x_m).summary(), y_m: RetainedLanes::all(&y_m).summary() }
+    }
+}
