@@ -93,3 +93,56 @@ impl Trial {
         self.dataset.robot.ticks_per_rev
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use dataset::LANES;
+    use motion_programs::Schedule;
+
+    use super::*;
+
+    fn paper(protocols: &[Schedule]) -> Scenario {
+        let mut paper = Scenario::parse(scenario::PAPER, "paper.toml").expect("the shipped scenario");
+        paper.protocols = protocols.to_vec();
+        paper
+    }
+
+    /// Every method on 48 trials, with the errors of those that do not apply.
+    fn check(scenario: &Scenario, what: &str) {
+        let [mut alone, mut side_by_side] = [(); 2].map(|()| Trial::new(scenario, 4).expect("simulates").at_point(1));
+        for first in (0..3 * LANES as u64).step_by(LANES) {
+            let replicates = side_by_side.drive_side_by_side(first).expect("goes in lanes");
+            for method in ["direct", "umbmark", "linear"].map(|name| calib::method(name).expect("there")) {
+                let found = method.calibrate_replicates(replicates);
+                assert_eq!(found.len(), LANES);
+                for (trial, found) in (first..).zip(found) {
+                    let session = [alone.drive(trial).expect("drives")];
+                    assert_eq!(found, method.calibrate(&session), "{what}: {} of trial {trial}", method.name());
+                }
+            }
+        }
+    }
+
+    /// Rejects, as was tried: a sum over all values instead of those retained, outliers of the other wheel,
+    /// slopes that are not averaged over the retained spins, the end's pose seen from the room.
+    #[test]
+    fn calibrations_side_by_side_are_those_of_each_trial() {
+        let (straights, squares) =
+            (Schedule::Straights { length_m: 0.5, runs: 11 }, Schedule::Squares { side_m: 4.0, runs_each_way: 3 });
+        let spins = |turn_rad| Schedule::Spins { turn_rad, runs: 8 };
+        check(&paper(&[straights, spins(std::f64::consts::TAU), squares]), "the paper's protocol");
+        // A wheelbase that scatters as much makes outliers, and turns beyond the reach of the short arctangent.
+        let mut wild = paper(&[straights, spins(1.3), squares]);
+        for effect in &mut wild.effects {
+            if let effects::Effect::ContactPatchWheelbase(effect) = effect {
+                effect.sigma_m = 0.05;
+            }
+        }
+        wild.noise.wheel_sigma_m_per_sqrt_m = 0.03;
+        check(&wild, "noisy wheels");
+        // Straights of no pulse: some trials have no value.
+        check(&paper(&[Schedule::Straights { length_m: 0.0007, runs: 5 }, spins(6.0)]), "no pulses");
+        check(&paper(&[straights]), "straights alone");
+        check(&paper(&[squares, spins(0.02)]), "spins of next to nothing");
+    }
+}

@@ -61,7 +61,7 @@ pub use record::{
 };
 pub use row_lengths::row_jitter_s;
 pub use sampling_period::SamplingPeriod;
-pub use session::{RunView, Session, fit_rigid_by};
+pub use session::{RunView, Session, fit_two_points};
 pub use settings::{MAX_ROW_S, MIN_LIDAR_TURN_RAD};
 pub use standstills::moving_pieces;
 pub use timestamps::Timestamps;

@@ -248,41 +248,90 @@ impl<'a> RunView<'a> {
 /// `room_from_body` that carries body points onto room points with the least squared error; `None` for fewer
 /// than two distinct points.
 fn fit_rigid(pairs: impl Iterator<Item = (Point, Point)> + Clone) -> Option<Pose> {
-    let [x_m, y_m, theta_rad] = fit_rigid_by(&Branching, pairs);
+    let mut sums = RigidSums::default();
+    pairs.clone().for_each(|pair| sums.add(pair));
+    let mut moments = sums.moments();
+    pairs.for_each(|pair| moments.add(pair));
+    let [x_m, y_m, theta_rad] = moments.pose(&Branching);
     // NaN where there is none.
     (!theta_rad.is_nan()).then_some(Pose::new(x_m, y_m, theta_rad))
 }
 
-/// The pose `room_from_body` (x, y, heading) that carries body points onto room points with the least squared
-/// error, by given elementary functions; NaN for fewer than two distinct points.
+/// As points read at one instant do: the pose `room_from_body` (x, y, heading) that carries two body points
+/// onto room points with the least squared error, by given elementary functions; NaN where they coincide.
 #[inline(always)]
 #[must_use]
-pub fn fit_rigid_by<E: Elementary>(
-    elementary: &E,
-    pairs: impl Iterator<Item = (Point, Point)> + Clone,
-) -> [f64; 3] {
-    let (mut count, mut body, mut room) = (0.0, Point::default(), Point::default());
-    for (b, r) in pairs.clone() {
-        count += 1.0;
-        body = Point::new(body.x_m + b.x_m, body.y_m + b.y_m);
-        room = Point::new(room.x_m + r.x_m, room.y_m + r.y_m);
+pub fn fit_two_points(elementary: &impl Elementary, [a, b]: [(Point, Point); 2]) -> [f64; 3] {
+    let mut sums = RigidSums::default();
+    sums.add(a);
+    sums.add(b);
+    let mut moments = sums.moments();
+    moments.add(a);
+    moments.add(b);
+    moments.pose(elementary)
+}
+
+/// Sums of points on the body and in the room.
+#[derive(Debug, Clone, Copy, Default)]
+struct RigidSums {
+    count: f64,
+    body: Point,
+    room: Point,
+}
+
+impl RigidSums {
+    #[inline(always)]
+    fn add(&mut self, (body, room): (Point, Point)) {
+        self.count += 1.0;
+        self.body = Point::new(self.body.x_m + body.x_m, self.body.y_m + body.y_m);
+        self.room = Point::new(self.room.x_m + room.x_m, self.room.y_m + room.y_m);
     }
-    let body = Point::new(body.x_m / count, body.y_m / count);
-    let room = Point::new(room.x_m / count, room.y_m / count);
-    let (mut dot, mut cross) = (0.0, 0.0);
-    for (b, r) in pairs {
-        let (bx, by) = (b.x_m - body.x_m, b.y_m - body.y_m);
-        let (rx, ry) = (r.x_m - room.x_m, r.y_m - room.y_m);
-        dot += bx * rx + by * ry;
-        cross += bx * ry - by * rx;
+
+    /// About the means, of no pair yet.
+    #[inline(always)]
+    fn moments(self) -> RigidMoments {
+        let Self { count, body, room } = self;
+        RigidMoments {
+            count,
+            body: Point::new(body.x_m / count, body.y_m / count),
+            room: Point::new(room.x_m / count, room.y_m / count),
+            dot: 0.0,
+            cross: 0.0,
+        }
     }
-    let theta_rad = elementary.atan2(cross, dot);
-    let turned = Frame::by(elementary, Pose::new(0.0, 0.0, theta_rad)) * body;
-    E::choose(
-        (count < 2.0) | ((dot == 0.0) & (cross == 0.0)),
-        || [f64::NAN; 3],
-        || [room.x_m - turned.x_m, room.y_m - turned.y_m, theta_rad],
-    )
+}
+
+/// Sums of products of points on the body and in the room, about their means.
+#[derive(Debug, Clone, Copy)]
+struct RigidMoments {
+    count: f64,
+    body: Point,
+    room: Point,
+    dot: f64,
+    cross: f64,
+}
+
+impl RigidMoments {
+    #[inline(always)]
+    fn add(&mut self, (body, room): (Point, Point)) {
+        let (bx, by) = (body.x_m - self.body.x_m, body.y_m - self.body.y_m);
+        let (rx, ry) = (room.x_m - self.room.x_m, room.y_m - self.room.y_m);
+        self.dot += bx * rx + by * ry;
+        self.cross += bx * ry - by * rx;
+    }
+
+    /// The pose; NaN for fewer than two distinct points.
+    #[inline(always)]
+    fn pose<E: Elementary>(&self, elementary: &E) -> [f64; 3] {
+        let Self { count, body, room, dot, cross } = *self;
+        let theta_rad = elementary.atan2(cross, dot);
+        let turned = Frame::by(elementary, Pose::new(0.0, 0.0, theta_rad)) * body;
+        E::choose(
+            (count < 2.0) | ((dot == 0.0) & (cross == 0.0)),
+            || [f64::NAN; 3],
+            || [room.x_m - turned.x_m, room.y_m - turned.y_m, theta_rad],
+        )
+    }
 }
 
 #[cfg(test)]

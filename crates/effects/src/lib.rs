@@ -41,7 +41,7 @@ pub use forward::{Command, Forward, Hooks, LaneForm, PoseReading, Readout, RunSt
 pub use hypothesis::{Hypothesis, RecordCorrection, Sign, Variant};
 pub use on_board::{Code, Correction, Input, IntervalScatter, OnBoard, RawInterval, Scatter, ScatterModel, SizeOf};
 pub use stream::{Address, Stream, StreamName};
-pub use stream_lanes::{StreamLanes, StreamsLanes};
+pub use stream_lanes::{NormalTable, StreamLanes, StreamsLanes};
 pub use term::{Sparse, SparseTerm};
 
 /// Declares the catalogue: for each effect its module and its parameters' type.

@@ -199,8 +199,8 @@ pub struct Stream {
 
 impl Stream {
     /// The stream of a generator's state.
-    pub(crate) const fn at(state: [u64; 4], half_widths: &'static [f64; LAYERS + 1]) -> Self {
-        Self { rng: Xoshiro256PlusPlus(state), half_widths }
+    pub(crate) fn at(state: [u64; 4]) -> Self {
+        Self { rng: Xoshiro256PlusPlus(state), half_widths: &HALF_WIDTHS }
     }
 
     /// The generator's state.

@@ -4,8 +4,10 @@
 //! A draw is a function of its address here as there, so that it does not matter how many lanes there are
 //! nor which trials they hold. Normals outside of their layer, 1.2 % of them, are drawn one by one.
 
-use crate::stream::{HALF_WIDTHS, LAYERS, Stream, StreamName, mix, next_word, normal_inside, state};
 use crate::Address;
+use crate::stream::{
+    HALF_WIDTHS, LAYERS, Stream, StreamName, mix, next_word, normal_inside, state,
+};
 
 /// The streams of W trials in one run: [`crate::Streams`] of each.
 #[derive(Debug, Clone)]
@@ -13,7 +15,6 @@ pub struct StreamsLanes<const W: usize> {
     seed: u64,
     trial: [u64; W],
     place: [u64; W],
-    half_widths: &'static [f64; LAYERS + 1],
 }
 
 impl<const W: usize> StreamsLanes<W> {
@@ -27,7 +28,7 @@ impl<const W: usize> StreamsLanes<W> {
             trial[lane] = mix(first.trial.wrapping_add(lane as u64) ^ seed);
             place[lane] = mix(first.place() ^ trial[lane]);
         }
-        Self { seed, trial, place, half_widths: &HALF_WIDTHS }
+        Self { seed, trial, place }
     }
 
     /// The stream of a name in every lane, at its beginning.
@@ -38,7 +39,21 @@ impl<const W: usize> StreamsLanes<W> {
         for lane in 0..W {
             put(&mut words, lane, state(self.seed, self.trial[lane], self.place[lane], name));
         }
-        StreamLanes { words, half_widths: self.half_widths }
+        StreamLanes { words }
+    }
+}
+
+/// The table that normals are looked up in. Whoever draws has it as a variable: what nobody else has an
+/// address of the compiler knows to be apart from the draws, and only then it makes vectors of the loop.
+#[derive(Debug, Clone, Copy)]
+pub struct NormalTable([f64; LAYERS + 1]);
+
+impl NormalTable {
+    /// The table.
+    #[inline(always)]
+    #[must_use]
+    pub fn load() -> Self {
+        Self(*HALF_WIDTHS)
     }
 }
 
@@ -47,19 +62,19 @@ impl<const W: usize> StreamsLanes<W> {
 pub struct StreamLanes<const W: usize> {
     /// The generators' states, word by word.
     words: [[u64; W]; 4],
-    half_widths: &'static [f64; LAYERS + 1],
 }
 
 impl<const W: usize> StreamLanes<W> {
     /// The next N standard normal draws of every lane.
     #[inline(always)]
-    pub fn normals<const N: usize>(&mut self) -> [[f64; W]; N] {
+    pub fn normals<const N: usize>(&mut self, table: &NormalTable) -> [[f64; W]; N] {
+        // As the table: variables, and nobody else's.
         let (mut draws, mut after, mut outside) = ([[0.0; W]; N], [[0; W]; 4], [0; W]);
         for lane in 0..W {
-            let (mut state, mut any) = (take(&self.words, lane), 0);
+            let (mut state, mut any) = (take(&self.words, lane), 0_u64);
             for draws in &mut draws {
                 let (word, next) = next_word(state);
-                let (x, is_inside) = normal_inside(word, self.half_widths);
+                let (x, is_inside) = normal_inside(word, &table.0);
                 state = next;
                 draws[lane] = x;
                 any |= u64::from(!is_inside);
@@ -70,7 +85,7 @@ impl<const W: usize> StreamLanes<W> {
         if outside.iter().fold(0, |any, outside| any | outside) != 0 {
             for lane in 0..W {
                 if outside[lane] != 0 {
-                    let (of_lane, state) = draw_one_by_one::<N>(take(&self.words, lane), self.half_widths);
+                    let (of_lane, state) = draw_again::<N>(take(&self.words, lane));
                     for n in 0..N {
                         draws[n][lane] = of_lane[n];
                     }
@@ -84,35 +99,30 @@ impl<const W: usize> StreamLanes<W> {
 
     /// The next draw of every lane, uniform in [0, 1).
     #[inline(always)]
-    pub fn uniform(&mut self) -> [f64; W] {
+    pub fn uniform(&mut self, draws: &mut [f64; W]) {
         /// 2⁻⁵³, which the 53 high bits of a word are counted in.
         const UNIT: f64 = 0.5 * f64::EPSILON;
-        let mut draws = [0.0; W];
         for lane in 0..W {
             let (word, after) = next_word(take(&self.words, lane));
             draws[lane] = UNIT * (word >> 11) as f64;
             put(&mut self.words, lane, after);
         }
-        draws
     }
 
     /// The next draw of every lane, uniform in [−half_width, half_width).
     #[inline(always)]
-    pub fn uniform_about_zero(&mut self, half_width: f64) -> [f64; W] {
-        let mut draws = self.uniform();
-        for draw in &mut draws {
+    pub fn uniform_about_zero(&mut self, half_width: f64, draws: &mut [f64; W]) {
+        self.uniform(draws);
+        for draw in draws {
             *draw = half_width * (2.0 * *draw - 1.0);
         }
-        draws
     }
 }
 
-/// The draws of a lane in which one is outside of its layer, and the state after them. By value: arrays that
-/// nobody has an address of the compiler knows to be apart from the table that draws are looked up in, and
-/// only then it makes vectors of loops over lanes.
+/// A lane's next N draws, of which one is outside of its layer, and the state after them.
 #[inline(never)]
-fn draw_one_by_one<const N: usize>(state: [u64; 4], half_widths: &'static [f64; LAYERS + 1]) -> ([f64; N], [u64; 4]) {
-    let mut stream = Stream::at(state, half_widths);
+fn draw_again<const N: usize>(state: [u64; 4]) -> ([f64; N], [u64; 4]) {
+    let mut stream = Stream::at(state);
     let draws = stream.normals();
     (draws, stream.state())
 }
@@ -146,12 +156,15 @@ mod tests {
         type Output = Vec<[f64; W]>;
         #[inline(always)]
         fn call(self) -> Vec<[f64; W]> {
+            let table = NormalTable::load();
             let mut stream = StreamsLanes::<W>::of(&self.first).stream(StreamName::new("wheel").nth(2));
+            let mut uniform = [0.0; W];
             let mut drawn = Vec::new();
             for _ in 0..10 {
-                drawn.extend(stream.normals::<4>());
-                drawn.push(stream.uniform());
-                drawn.extend(stream.normals::<1>());
+                drawn.extend(stream.normals::<4>(&table));
+                stream.uniform(&mut uniform);
+                drawn.push(uniform);
+                drawn.extend(stream.normals::<1>(&table));
             }
             drawn
         }

@@ -194,10 +194,10 @@ pub trait Formula<const N: usize> {
 }
 
 /// A formula of W lanes side by side, in lanes beyond the reach of [`BranchFree`] by itself: the same bits
-/// for any W.
+/// for any W. Into arrays that are there: to make and to copy some costs as much as a short formula.
 #[inline(always)]
-pub fn by_lanes<const W: usize, const N: usize>(formula: &impl Formula<N>) -> [[f64; W]; N] {
-    let (mut values, mut outside) = ([[0.0; W]; N], [0; W]);
+pub fn by_lanes<const W: usize, const N: usize>(formula: &impl Formula<N>, values: &mut [[f64; W]; N]) {
+    let mut outside = [0; W];
     for lane in 0..W {
         let elementary = BranchFree::default();
         let of = formula.of(lane, &elementary);
@@ -207,9 +207,8 @@ pub fn by_lanes<const W: usize, const N: usize>(formula: &impl Formula<N>) -> [[
         outside[lane] = elementary.outside();
     }
     if outside.iter().fold(0, |any, outside| any | outside) != 0 {
-        values = one_by_one(formula, outside, values);
+        *values = one_by_one(formula, outside, *values);
     }
-    values
 }
 
 /// By value: arrays that nobody has an address of do not keep the loop above from becoming vectors.
@@ -276,7 +275,8 @@ mod tests {
         #[test]
         fn lanes_have_the_values_of_one_argument_at_a_time(numbers in prop::collection::vec((number(), number()), 16)) {
             let numbers: Vec<[f64; 2]> = numbers.into_iter().map(|(x, y)| [x, y]).collect();
-            let found: [[f64; 16]; 10] = by_lanes(&Everything(&numbers));
+            let mut found = [[0.0; 16]; 10];
+            by_lanes(&Everything(&numbers), &mut found);
             for lane in 0..16 {
                 for (found, expected) in found.iter().zip(Everything(&numbers).of(lane, &Branching)) {
                     let found = found[lane];

@@ -6,7 +6,7 @@
 //! in lanes, and floor grids are all that measures; elsewhere trials are driven one by one.
 
 use dataset::{ReplicatedReading, ReplicatedRun, Replicates, RunInfo};
-use effects::{Address, LaneForm, StreamLanes, StreamName, StreamsLanes};
+use effects::{Address, LaneForm, NormalTable, StreamLanes, StreamName, StreamsLanes};
 use kinematics::{BridgeCovariance, Elementary, Formula, Frame, Increment, InstructionSet, Kernel, Point, Pose, Wheels};
 use kinematics::by_lanes;
 use scenario::Placement;
@@ -97,28 +97,36 @@ impl<const W: usize> Kernel for DriveRun<'_, W> {
     #[inline(always)]
     fn call(self) {
         let Self { drive: LaneDrive { setup, placement, counts_per_turn, .. }, plan, address, run } = self;
+        let table = NormalTable::load();
         let streams = StreamsLanes::<W>::of(&address);
-        let mut separations = self.drive.separations(&streams);
+        let mut separations = self.drive.separations(&streams, &table);
         let mut grids = Vec::with_capacity(self.drive.grids.len());
         for (name, grid) in &self.drive.grids {
             grids.push((streams.stream(*name), *grid));
         }
         let mut wheel_noise = streams.stream(self.drive.streams.wheel_noise);
         let mut placed = streams.stream(self.drive.streams.placement);
-        let x_m = placed.uniform_about_zero(placement.half_width_m);
-        let y_m = placed.uniform_about_zero(placement.half_width_m);
-        let theta_rad = placed.uniform_about_zero(placement.half_width_rad);
-        let mut frame = by_lanes(&StartFrame { pose: [x_m, y_m, theta_rad] });
+        let mut start = StartFrame { pose: [[0.0; W]; 3] };
+        let [x_m, y_m, theta_rad] = &mut start.pose;
+        placed.uniform_about_zero(placement.half_width_m, x_m);
+        placed.uniform_about_zero(placement.half_width_m, y_m);
+        placed.uniform_about_zero(placement.half_width_rad, theta_rad);
         let mut phase = streams.stream(self.drive.streams.wheel_phase);
-        let mut counts = Wheels { left: phase.uniform(), right: phase.uniform() };
+        let mut counts = Wheels { left: [0.0; W], right: [0.0; W] };
+        phase.uniform(&mut counts.left);
+        phase.uniform(&mut counts.right);
         scale(&mut counts.left, *counts_per_turn);
         scale(&mut counts.right, *counts_per_turn);
-        let mut readings = run.point_readings.iter_mut();
+
+        let (mut frame, mut rolled) = ([[0.0; W]; 5], [[0.0; W]; 5]);
+        by_lanes(&start, &mut frame);
+        let (mut room_m, mut readings) = ([[0.0; W]; 2], run.point_readings.iter_mut());
         for (interval, ticks) in plan.intervals.iter().zip(&mut run.ticks) {
             if interval.sets_out {
                 for separation in &mut separations {
-                    [separation.now_m] = separation.stream.normals();
-                    scale(&mut separation.now_m, separation.sigma_m);
+                    let [mut draws] = separation.stream.normals(&table);
+                    scale(&mut draws, separation.sigma_m);
+                    separation.now_m = draws;
                 }
             }
             for &segment in &interval.segments {
@@ -127,14 +135,22 @@ impl<const W: usize> Kernel for DriveRun<'_, W> {
                 let travel_m = setup.true_radius_m.zip_with(shaft_rad, |radius_m, turn_rad| radius_m * turn_rad);
                 let travel_var_m2 = setup.noise.travel_var_m2(travel_m);
                 let is_noisy = travel_var_m2.left > 0.0 || travel_var_m2.right > 0.0;
-                let draws = if is_noisy { wheel_noise.normals() } else { [[0.0; W]; 4] };
+                let draws = if is_noisy { wheel_noise.normals(&table) } else { [[0.0; W]; 4] };
                 let mut separation_m = [setup.wheel_separation_m; W];
                 for separation in &separations {
                     for lane in 0..W {
                         separation_m[lane] += separation.now_m[lane];
                     }
                 }
-                frame = by_lanes(&RolledFrame { frame: &frame, draws: &draws, separation_m, travel_m, travel_var_m2 });
+                let step = RolledFrame {
+                    frame: &frame,
+                    draws: &draws,
+                    separation_m: &separation_m,
+                    travel_m,
+                    travel_var_m2,
+                };
+                by_lanes(&step, &mut rolled);
+                frame = rolled;
                 add(&mut counts.left, shaft_rad.left * setup.counts_per_rad);
                 add(&mut counts.right, shaft_rad.right * setup.counts_per_rad);
             }
@@ -142,9 +158,10 @@ impl<const W: usize> Kernel for DriveRun<'_, W> {
             if interval.is_read {
                 for (stream, grid) in &mut grids {
                     for (point, reading) in setup.points.iter().zip(&mut readings) {
-                        let draws = stream.normals();
-                        [reading.x_m, reading.y_m] =
-                            by_lanes(&MarkReading { frame: &frame, draws: &draws, mark: point.body, grid: *grid });
+                        let draws = stream.normals(&table);
+                        let mark = MarkReading { frame: &frame, draws: &draws, mark: point.body, grid: *grid };
+                        by_lanes(&mark, &mut room_m);
+                        [reading.x_m, reading.y_m] = room_m;
                     }
                 }
             }
@@ -155,12 +172,16 @@ impl<const W: usize> Kernel for DriveRun<'_, W> {
 impl LaneDrive {
     /// The effects on the wheel separation, at a run's start.
     #[inline(always)]
-    fn separations<const W: usize>(&self, streams: &StreamsLanes<W>) -> Vec<SeparationLanes<W>> {
+    fn separations<const W: usize>(
+        &self,
+        streams: &StreamsLanes<W>,
+        table: &NormalTable,
+    ) -> Vec<SeparationLanes<W>> {
         let mut separations = Vec::new();
         for (name, form) in &self.effects {
             if let LaneForm::SeparationPerMotion { sigma_m } = *form {
                 let mut stream = streams.stream(*name);
-                let _unused: [[f64; W]; 1] = stream.normals();
+                let _unused: [[f64; W]; 1] = stream.normals(table);
                 separations.push(SeparationLanes { stream, sigma_m, now_m: [0.0; W] });
             }
         }
@@ -170,12 +191,15 @@ impl LaneDrive {
     /// What the log shows of a counter.
     #[inline(always)]
     fn ticks<const W: usize>(&self, counts: &[f64; W]) -> [f64; W] {
-        let [mut ticks] = by_lanes(&WholeTicks { counts, counts_per_tick: 1.0 });
+        let mut ticks = [[0.0; W]];
+        by_lanes(&WholeCounts { counts }, &mut ticks);
         for (_, form) in &self.effects {
             if let LaneForm::Ticks { counts } = *form {
-                [ticks] = by_lanes(&WholeTicks { counts: &ticks, counts_per_tick: f64::from(counts) });
+                let [whole_counts] = ticks;
+                by_lanes(&WholeTicks { counts: &whole_counts, counts_per_tick: f64::from(counts) }, &mut ticks);
             }
         }
+        let [ticks] = ticks;
         ticks
     }
 }
@@ -213,7 +237,7 @@ struct RolledFrame<'s, const W: usize> {
     frame: &'s [[f64; W]; 5],
     /// For the left and the right wheel, along the chord and across it.
     draws: &'s [[f64; W]; 4],
-    separation_m: [f64; W],
+    separation_m: &'s [f64; W],
     travel_m: Wheels<f64>,
     travel_var_m2: Wheels<f64>,
 }
@@ -249,7 +273,19 @@ impl<const W: usize> Formula<2> for MarkReading<'_, W> {
     }
 }
 
-/// The whole ticks in counts. A quotient of whole numbers under 2⁵⁰ is nearer to the whole number below it
+/// The whole counts that a counter shows.
+struct WholeCounts<'c, const W: usize> {
+    counts: &'c [f64; W],
+}
+
+impl<const W: usize> Formula<1> for WholeCounts<'_, W> {
+    #[inline(always)]
+    fn of<E: Elementary>(&self, lane: usize, elementary: &E) -> [f64; 1] {
+        [elementary.floor(self.counts[lane])]
+    }
+}
+
+/// The whole ticks in whole counts. A quotient of whole numbers under 2⁵⁰ is nearer to the whole number below it
 /// than to the next by more than its rounding, so that its floor is that of the division.
 struct WholeTicks<'c, const W: usize> {
     counts: &'c [f64; W],

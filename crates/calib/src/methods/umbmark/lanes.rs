@@ -1,6 +1,6 @@
 //! `umbmark` for trials side by side: the same formulas in loops over lanes.
 
-use dataset::{LANES, MarkedPoint, Protocol, ReplicatedReading, ReplicatedRun, Replicates, fit_rigid_by};
+use dataset::{LANES, MarkedPoint, Protocol, ReplicatedReading, ReplicatedRun, Replicates, fit_two_points};
 use kinematics::{
     DriveGeometry, Elementary, Formula, Frame, InstructionSet, Kernel, Odometry, Point, Pose, Rule, Wheels, by_lanes,
 };
@@ -25,18 +25,20 @@ pub(super) fn calibrate(method: &Umbmark, replicates: &Replicates) -> Vec<Result
 struct InputLanes<'r, const W: usize> {
     geometry: DriveGeometry,
     odometry: Odometry,
-    points: &'r [MarkedPoint],
     side_m: f64,
     /// Squares clockwise and counter-clockwise.
     squares: [Vec<SquareLanes<'r, W>>; 2],
 }
 
-/// A square with the marks read at its start and at its end.
+/// A square with two marks read at its start and at its end.
 struct SquareLanes<'r, const W: usize> {
     ticks: &'r [Wheels<[f64; W]>],
-    start: &'r [ReplicatedReading<W>],
-    end: &'r [ReplicatedReading<W>],
+    start: Marks<'r, W>,
+    end: Marks<'r, W>,
 }
+
+/// Two marks: where each is on the robot, and its readings in the room.
+type Marks<'r, const W: usize> = [(Point, &'r ReplicatedReading<W>); 2];
 
 impl<'r, const W: usize> InputLanes<'r, W> {
     /// `None` where every trial is to be looked at by itself.
@@ -47,7 +49,7 @@ impl<'r, const W: usize> InputLanes<'r, W> {
             Odometry { m_per_count, wheel_separation_m: geometry.wheel_separation_m(), rule: Rule::Midpoint };
         let squares = |protocol| {
             let runs = replicates.runs.iter().filter(move |run| run.info.protocol == Some(protocol));
-            runs.map(SquareLanes::of).collect::<Option<Vec<_>>>().filter(|squares| !squares.is_empty())
+            runs.map(|run| SquareLanes::of(run, &replicates.points)).collect::<Option<Vec<_>>>().filter(|squares| !squares.is_empty())
         };
         let is_square = |run: &&ReplicatedRun<W>| {
             matches!(run.info.protocol, Some(Protocol::SquareCw | Protocol::SquareCcw))
@@ -58,60 +60,41 @@ impl<'r, const W: usize> InputLanes<'r, W> {
             return None;
         }
         let squares = [squares(Protocol::SquareCw)?, squares(Protocol::SquareCcw)?];
-        Some(Self { geometry, odometry, points: &replicates.points, side_m, squares })
+        Some(Self { geometry, odometry, side_m, squares })
     }
 }
 
 impl<'r, const W: usize> SquareLanes<'r, W> {
-    /// `None` where a pose is not read at two instants.
-    fn of(run: &'r ReplicatedRun<W>) -> Option<Self> {
+    /// `None` where two marks are not read at two instants.
+    fn of(run: &'r ReplicatedRun<W>, points: &[MarkedPoint]) -> Option<Self> {
+        let marks = |readings: &'r [ReplicatedReading<W>]| match readings {
+            [a, b] => Some([(points.get(a.point)?.body, a), (points.get(b.point)?.body, b)]),
+            _ => None,
+        };
         let mut instants = run.point_readings.chunk_by(|a, b| a.t_s == b.t_s);
-        let (start, end) = (instants.next()?, instants.next_back()?);
+        let (start, end) = (marks(instants.next()?)?, marks(instants.next_back()?)?);
         (!run.ticks.is_empty()).then_some(Self { ticks: &run.ticks, start, end })
     }
 }
 
 /// Where a square ended, seen from its start, by the marks.
-struct MeasuredEnd<'i, 'r, const W: usize> {
-    square: &'i SquareLanes<'r, W>,
-    points: &'r [MarkedPoint],
-}
+struct MeasuredEnd<'i, 'r, const W: usize>(&'i SquareLanes<'r, W>);
 
 impl<const W: usize> Formula<2> for MeasuredEnd<'_, '_, W> {
     #[inline(always)]
     fn of<E: Elementary>(&self, lane: usize, elementary: &E) -> [f64; 2] {
-        let [x_m, y_m, theta_rad] = fit_rigid_by(elementary, Pairs::of(self.square.start, self.points, lane));
-        let [end_x_m, end_y_m, _] = fit_rigid_by(elementary, Pairs::of(self.square.end, self.points, lane));
+        let [x_m, y_m, theta_rad] = fit_two_points(elementary, pairs(&self.0.start, lane));
+        let [end_x_m, end_y_m, _] = fit_two_points(elementary, pairs(&self.0.end, lane));
         let start_from_world = Frame::by(elementary, Pose::new(x_m, y_m, theta_rad)).inverse();
         let end = start_from_world * Point { x_m: end_x_m, y_m: end_y_m };
         [end.x_m, end.y_m]
     }
 }
 
-/// Marks on the robot and as one trial read them in the room.
-#[derive(Clone)]
-struct Pairs<'r, const W: usize> {
-    readings: &'r [ReplicatedReading<W>],
-    points: &'r [MarkedPoint],
-    lane: usize,
-}
-
-impl<'r, const W: usize> Pairs<'r, W> {
-    #[inline(always)]
-    const fn of(readings: &'r [ReplicatedReading<W>], points: &'r [MarkedPoint], lane: usize) -> Self {
-        Self { readings, points, lane }
-    }
-}
-
-impl<const W: usize> Iterator for Pairs<'_, W> {
-    type Item = (Point, Point);
-
-    #[inline(always)]
-    fn next(&mut self) -> Option<(Point, Point)> {
-        let (reading, later) = self.readings.split_first()?;
-        self.readings = later;
-        Some((self.points[reading.point].body, reading.room(self.lane)))
-    }
+/// The marks on the robot and as one trial read them in the room.
+#[inline(always)]
+const fn pairs<const W: usize>(&[(a, in_room_a), (b, in_room_b)]: &Marks<'_, W>, lane: usize) -> [(Point, Point); 2] {
+    [(a, in_room_a.room(lane)), (b, in_room_b.room(lane))]
 }
 
 /// End errors of the squares of one direction.
@@ -149,14 +132,15 @@ impl<const W: usize> InputLanes<'_, W> {
         let (mut x_m, mut y_m) = (Vec::with_capacity(squares.len()), Vec::with_capacity(squares.len()));
         for square in squares {
             // In the start's frame the odometry starts at the origin and the first leg points along +x.
-            let [mut x_error_m, mut y_error_m] = by_lanes(&MeasuredEnd { square, points: self.points });
+            let mut error_m = [[0.0; W]; 2];
+            by_lanes(&MeasuredEnd(square), &mut error_m);
             let dead_reckoned = self.odometry.final_midpoint_poses(Pose::IDENTITY, square.ticks.iter().copied());
             for lane in 0..W {
-                x_error_m[lane] -= dead_reckoned[lane].x_m;
-                y_error_m[lane] -= dead_reckoned[lane].y_m;
+                error_m[0][lane] -= dead_reckoned[lane].x_m;
+                error_m[1][lane] -= dead_reckoned[lane].y_m;
             }
-            x_m.push(x_error_m);
-            y_m.push(y_error_m);
+            x_m.push(error_m[0]);
+            y_m.push(error_m[1]);
         }
         DirectionLanes { x_m: RetainedLanes::all(&x_m).summary(), y_m: RetainedLanes::all(&y_m).summary() }
     }
