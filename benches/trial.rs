@@ -1,6 +1,6 @@
 //! One Monte-Carlo trial of the paper (30 straights, 30 spins, 10 squares): driven in closed form and
-//! stepped, calibrated by each method, all of it together beside a bare loop that does the same, a point of a
-//! sweep, and the Cramér–Rao bound of one. At last the ratios of these, timed in turn: medians over rounds of
+//! stepped, calibrated by each method, all of it together beside a bare loop that does the same, and by trials
+//! side by side, a point of a sweep, and the Cramér–Rao bound of one. At last the ratios of these, timed in turn: medians over rounds of
 //! the fastest of five.
 
 mod yardstick;
@@ -54,6 +54,15 @@ fn trial(criterion: &mut Criterion) {
             methods.map(|method| method.calibrate(&session).expect("applies"))
         });
     });
+    group.throughput(Throughput::Elements(dataset::LANES as u64));
+    group.bench_function("whole/side_by_side", |bencher| {
+        bencher.iter(|| {
+            number += dataset::LANES as u64;
+            let replicates = trial.drive_side_by_side(number).expect("goes in lanes");
+            methods.map(|method| method.calibrate_replicates(replicates))
+        });
+    });
+    group.throughput(Throughput::Elements(1));
     let mut bare = yardstick::Yardstick::new(1);
     group.bench_function("whole/bare_loop", |bencher| {
         bencher.iter(|| {
@@ -147,9 +156,14 @@ fn ratios(_: &mut Criterion) {
         let of_bare_s = fastest_s(100, || {
             black_box(bare.trial());
         });
-        rounds.push([of_closed_s, of_stepping_s, of_whole_s, of_bare_s]);
+        let of_block_s = fastest_s(20, || {
+            number += dataset::LANES as u64;
+            let replicates = whole.drive_side_by_side(number).expect("goes in lanes");
+            black_box(methods.map(|method| method.calibrate_replicates(replicates)));
+        });
+        rounds.push([of_closed_s, of_stepping_s, of_whole_s, of_bare_s, of_block_s / dataset::LANES as f64]);
     }
-    let median = |of: &dyn Fn(&[f64; 4]) -> f64| {
+    let median = |of: &dyn Fn(&[f64; 5]) -> f64| {
         let mut values: Vec<f64> = rounds.iter().map(of).collect();
         values.sort_by(f64::total_cmp);
         values[values.len() / 2]
@@ -159,6 +173,8 @@ fn ratios(_: &mut Criterion) {
     println!("stepping / closed form   {:8.0}", median(&|times| times[1] / times[0]));
     println!("with calibration         {:8.1} us", 1e6 * median(&|times| times[2]));
     println!("  of it the bare loop    {:8.0} %", 100.0 * median(&|times| times[3] / times[2]));
+    println!("side by side             {:8.2} us", 1e6 * median(&|times| times[4]));
+    println!("  gain over one by one   {:8.2}", median(&|times| times[2] / times[4]));
 }
 
 criterion_group!(benches, trial, sweep, bound, ratios);

@@ -10,7 +10,7 @@ use effects::CATALOGUE;
 
 /// Literals that are ids by accident: the file's end, the word, and what it is there.
 const OTHER_WORDS: [(&str, &str, &str); 1] =
-    [("methods/direct/mod.rs", "wheelbase", "which of a run's values an outlier rule rejected, in a message")];
+    [("methods/direct/formulas.rs", "wheelbase", "which of a run's values an outlier rule rejected, in a message")];
 
 /// Something that a file should not have: its line, from 1, and what.
 type Complaint = (usize, String);

@@ -131,7 +131,7 @@ mod tests {
             (Schedule::Straights { length_m: 0.5, runs: 11 }, Schedule::Squares { side_m: 4.0, runs_each_way: 3 });
         let spins = |turn_rad| Schedule::Spins { turn_rad, runs: 8 };
         check(&paper(&[straights, spins(std::f64::consts::TAU), squares]), "the paper's protocol");
-        // A wheelbase that scatters as much makes outliers, and turns beyond the reach of the short arctangent.
+        // Outliers, and turns beyond the reach of the short arctangent.
         let mut wild = paper(&[straights, spins(1.3), squares]);
         for effect in &mut wild.effects {
             if let effects::Effect::ContactPatchWheelbase(effect) = effect {

@@ -53,12 +53,12 @@ pub use pose_covariance::PoseCovariance;
 pub use prefetch::read_ahead;
 pub use read::{Blocks, Loaded, RunByRun, read};
 pub use receipt_delays::has_bunched_rows;
-pub use replicates::{LANES, ReplicatedReading, ReplicatedRun, Replicates};
 pub use record::{
     CovarianceScale, Dataset, Displacement, ExtraChannel, MarkedPoint, NominalRobot, Odometry, PointReading, Protocol,
     ProtocolSettings, Provenance, Run, RunInfo, TruthNoise, TruthSample, TruthSigma, UnknownMotion, WheelLog,
     WheelSpeed,
 };
+pub use replicates::{LANES, ReplicatedReading, ReplicatedRun, Replicates};
 pub use row_lengths::row_jitter_s;
 pub use sampling_period::SamplingPeriod;
 pub use session::{RunView, Session, fit_two_points};

@@ -5,7 +5,9 @@
 
 use kinematics::{Point, Wheels};
 
-use crate::record::{Dataset, MarkedPoint, NominalRobot, Odometry, PointReading, Provenance, Run, RunInfo, TruthNoise, WheelLog};
+use crate::record::{
+    Dataset, MarkedPoint, NominalRobot, Odometry, PointReading, Provenance, Run, RunInfo, TruthNoise, WheelLog,
+};
 
 /// How many trials stand side by side: two vectors of the widest instructions.
 pub const LANES: usize = 16;

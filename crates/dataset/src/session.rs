@@ -1,7 +1,9 @@
 //! Borrowed views of a dataset: what estimators take. A subset of the runs (training, held out) copies
 //! nothing.
 
-use kinematics::{Branching, Count, Elementary, Frame, Odometry as DeadReckoner, Point, Pose, Rule, Wheels, unwrap_near};
+use kinematics::{
+    Branching, Count, Elementary, Frame, Odometry as DeadReckoner, Point, Pose, Rule, Wheels, unwrap_near,
+};
 
 use crate::record::{Dataset, MarkedPoint, NominalRobot, Odometry, Run, RunInfo, TruthNoise, WheelLog};
 

@@ -90,7 +90,10 @@ impl Streams {
     pub fn stream(&self, name: StreamName) -> Stream {
         // A bijection of the address's words and the name's: each was mixed with the ones before it, and is
         // now with the ones after it.
-        Stream { rng: Xoshiro256PlusPlus(state(self.seed, self.trial, self.place, name)), half_widths: self.half_widths }
+        Stream {
+            rng: Xoshiro256PlusPlus(state(self.seed, self.trial, self.place, name)),
+            half_widths: self.half_widths,
+        }
     }
 }
 

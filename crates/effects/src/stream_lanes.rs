@@ -5,9 +5,7 @@
 //! nor which trials they hold. Normals outside of their layer, 1.2 % of them, are drawn one by one.
 
 use crate::Address;
-use crate::stream::{
-    HALF_WIDTHS, LAYERS, Stream, StreamName, mix, next_word, normal_inside, state,
-};
+use crate::stream::{HALF_WIDTHS, LAYERS, Stream, StreamName, mix, next_word, normal_inside, state};
 
 /// The streams of W trials in one run: [`crate::Streams`] of each.
 #[derive(Debug, Clone)]
@@ -102,6 +100,7 @@ impl<const W: usize> StreamLanes<W> {
     pub fn uniform(&mut self, draws: &mut [f64; W]) {
         /// 2⁻⁵³, which the 53 high bits of a word are counted in.
         const UNIT: f64 = 0.5 * f64::EPSILON;
+        #[allow(clippy::needless_range_loop)] // arrays side by side
         for lane in 0..W {
             let (word, after) = next_word(take(&self.words, lane));
             draws[lane] = UNIT * (word >> 11) as f64;

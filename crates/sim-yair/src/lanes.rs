@@ -7,8 +7,10 @@
 
 use dataset::{ReplicatedReading, ReplicatedRun, Replicates, RunInfo};
 use effects::{Address, LaneForm, NormalTable, StreamLanes, StreamName, StreamsLanes};
-use kinematics::{BridgeCovariance, Elementary, Formula, Frame, Increment, InstructionSet, Kernel, Point, Pose, Wheels};
 use kinematics::by_lanes;
+use kinematics::{
+    BridgeCovariance, Elementary, Formula, Frame, Increment, InstructionSet, Kernel, Point, Pose, Wheels,
+};
 use scenario::Placement;
 
 use crate::actuator::ConstantSpeed;
@@ -138,17 +140,13 @@ impl<const W: usize> Kernel for DriveRun<'_, W> {
                 let draws = if is_noisy { wheel_noise.normals(&table) } else { [[0.0; W]; 4] };
                 let mut separation_m = [setup.wheel_separation_m; W];
                 for separation in &separations {
+                    #[allow(clippy::needless_range_loop)] // arrays side by side
                     for lane in 0..W {
                         separation_m[lane] += separation.now_m[lane];
                     }
                 }
-                let step = RolledFrame {
-                    frame: &frame,
-                    draws: &draws,
-                    separation_m: &separation_m,
-                    travel_m,
-                    travel_var_m2,
-                };
+                let step =
+                    RolledFrame { frame: &frame, draws: &draws, separation_m: &separation_m, travel_m, travel_var_m2 };
                 by_lanes(&step, &mut rolled);
                 frame = rolled;
                 add(&mut counts.left, shaft_rad.left * setup.counts_per_rad);
@@ -172,11 +170,7 @@ impl<const W: usize> Kernel for DriveRun<'_, W> {
 impl LaneDrive {
     /// The effects on the wheel separation, at a run's start.
     #[inline(always)]
-    fn separations<const W: usize>(
-        &self,
-        streams: &StreamsLanes<W>,
-        table: &NormalTable,
-    ) -> Vec<SeparationLanes<W>> {
+    fn separations<const W: usize>(&self, streams: &StreamsLanes<W>, table: &NormalTable) -> Vec<SeparationLanes<W>> {
         let mut separations = Vec::new();
         for (name, form) in &self.effects {
             if let LaneForm::SeparationPerMotion { sigma_m } = *form {
@@ -285,8 +279,8 @@ impl<const W: usize> Formula<1> for WholeCounts<'_, W> {
     }
 }
 
-/// The whole ticks in whole counts. A quotient of whole numbers under 2⁵⁰ is nearer to the whole number below it
-/// than to the next by more than its rounding, so that its floor is that of the division.
+/// The whole ticks in whole counts. A quotient of whole numbers under 2⁵⁰ is nearer to the whole number below
+/// it than to the next by more than its rounding, so that its floor is that of the division.
 struct WholeTicks<'c, const W: usize> {
     counts: &'c [f64; W],
     counts_per_tick: f64,
@@ -371,8 +365,8 @@ mod tests {
         }
     }
 
-    /// Rejects, as was tried: a heading that is not carried on, the effect's unused draw left out, readings
-    /// in the order of their instants only, ticks rounded to the nearest.
+    /// Rejects, as was tried: a heading that is not carried on, the effect's unused draw left out, counts
+    /// rounded to the nearest.
     #[test]
     fn trials_side_by_side_record_what_each_records_by_itself() {
         check::<16>(&paper(), "the paper's robot");

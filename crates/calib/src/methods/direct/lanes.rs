@@ -5,19 +5,22 @@
 use dataset::{LANES, Protocol, ReplicatedReading, ReplicatedRun, Replicates};
 use kinematics::{DriveGeometry, Elementary, Formula, InstructionSet, Kernel, Point, Side, Wheels, by_lanes};
 
-use super::{Direct, Marks, Spin, calibration, outermost, outside_m};
-use crate::estimate::{CalibError, Calibration, Method};
+use super::formulas::{Marks, Spin, WHEELBASE, calibration, check_marks, outermost, outlier, outside_m};
+use crate::estimate::{CalibError, Calibration};
+use crate::robust::MedianMad;
 use crate::robust_lanes::{RetainedLanes, SummaryLanes};
 use crate::settings::MIN_SPIN_RAD;
 
-/// Calibrates every trial.
-pub(super) fn calibrate(method: &Direct, replicates: &Replicates) -> Vec<Result<Calibration, CalibError>> {
-    let lanes = InputLanes::of(replicates).map(|input| (Found::of(method, &input), input));
-    let calibrated = |lane: usize| match &lanes {
-        Some((found, input)) if found.is_regular[lane] => found.calibration(method, replicates, input, lane),
-        _ => method.calibrate(&[replicates.dataset(lane).session()]),
-    };
-    (0..LANES).map(calibrated).collect()
+/// The calibration of every trial; `None` where it is to be calibrated by itself.
+pub(super) fn calibrations(
+    outliers: &MedianMad,
+    replicates: &Replicates,
+) -> [Option<Result<Calibration, CalibError>>; LANES] {
+    let lanes = InputLanes::of(replicates).map(|input| (Found::of(outliers, &input), input));
+    std::array::from_fn(|lane| {
+        let (found, input) = lanes.as_ref()?;
+        found.is_regular[lane].then(|| found.calibration(outliers, replicates, input, lane))
+    })
 }
 
 /// What the method looks at.
@@ -44,7 +47,7 @@ impl<'r, const W: usize> InputLanes<'r, W> {
         let geometry = replicates.robot.geometry().ok()?;
         let outermost = outermost(&replicates.points)?;
         let body = outermost.map(|(_, body)| body);
-        Direct::check_marks(body).ok()?;
+        check_marks(body).ok()?;
         let outside_m = outside_m(body, 0.5 * geometry.wheel_separation_m());
         let rad_per_tick = std::f64::consts::TAU / replicates.robot.ticks_per_rev?;
         let measured = |run: &'r ReplicatedRun<W>| {
@@ -136,6 +139,7 @@ impl<const W: usize> ColumnLanes<W> {
     #[inline(always)]
     fn push(&mut self, values: &[f64; W], stated_sigma: &[f64; W]) {
         self.values.push(*values);
+        #[allow(clippy::needless_range_loop)] // arrays side by side
         for lane in 0..W {
             self.stated_sigma[lane] = self.stated_sigma[lane].max(stated_sigma[lane]);
         }
@@ -183,13 +187,13 @@ struct Found<const W: usize> {
 }
 
 impl<const W: usize> Found<W> {
-    fn of(method: &Direct, input: &InputLanes<'_, W>) -> Self {
-        InstructionSet::widest().run(Estimate { method, input })
+    fn of(outliers: &MedianMad, input: &InputLanes<'_, W>) -> Self {
+        InstructionSet::widest().run(Estimate { outliers, input })
     }
 
     fn calibration(
         &self,
-        method: &Direct,
+        outliers: &MedianMad,
         replicates: &Replicates<W>,
         input: &InputLanes<'_, W>,
         lane: usize,
@@ -198,10 +202,10 @@ impl<const W: usize> Found<W> {
         for (retained, runs, of) in [
             (&self.left, &input.straights, Side::Left.name()),
             (&self.right, &input.straights, Side::Right.name()),
-            (&self.base, &input.spins, "wheelbase"),
+            (&self.base, &input.spins, WHEELBASE),
         ] {
             let of_lane = retained.outliers.iter().filter(|(of_lane, _)| *of_lane == lane);
-            runs_rejected.extend(of_lane.map(|(_, run)| method.rejected(runs[*run].id, of)));
+            runs_rejected.extend(of_lane.map(|(_, run)| outlier(outliers, runs[*run].id, of)));
         }
         let m_per_rad = Wheels { left: self.left.summary.of(lane), right: self.right.summary.of(lane) };
         let slope = Wheels { left: self.slope.left[lane], right: self.slope.right[lane] };
@@ -213,7 +217,7 @@ impl<const W: usize> Found<W> {
 
 /// The work on all lanes.
 struct Estimate<'i, 'r, const W: usize> {
-    method: &'i Direct,
+    outliers: &'i MedianMad,
     input: &'i InputLanes<'r, W>,
 }
 
@@ -223,7 +227,7 @@ impl<const W: usize> Kernel for Estimate<'_, '_, W> {
     #[inline(always)]
     fn call(self) -> Found<W> {
         let InputLanes { geometry, mark_sigma_m, straights, spins } = self.input;
-        let outliers = &self.method.outliers;
+        let outliers = self.outliers;
         let mut is_regular = [true; W];
         // Both ends of a chord are read.
         let chord_sigma_m = 2_f64.sqrt() * mark_sigma_m;

@@ -5,20 +5,22 @@ use kinematics::{
     DriveGeometry, Elementary, Formula, Frame, InstructionSet, Kernel, Odometry, Point, Pose, Rule, Wheels, by_lanes,
 };
 
-use super::{Direction, Umbmark};
-use crate::estimate::{CalibError, Calibration, Method};
+use super::formulas::{Direction, Form, calibration};
+use crate::estimate::{CalibError, Calibration};
 use crate::robust_lanes::{RetainedLanes, SummaryLanes};
 
-/// Calibrates every trial.
-pub(super) fn calibrate(method: &Umbmark, replicates: &Replicates) -> Vec<Result<Calibration, CalibError>> {
+/// The calibration of every trial; `None` where it is to be calibrated by itself.
+pub(super) fn calibrations(
+    form: Form,
+    replicates: &Replicates,
+) -> [Option<Result<Calibration, CalibError>>; LANES] {
     let lanes = InputLanes::of(replicates).map(|input| (InstructionSet::widest().run(EndErrors(&input)), input));
-    let calibrated = |lane: usize| match &lanes {
-        Some(([cw, ccw], input)) if cw.is_finite(lane) && ccw.is_finite(lane) => {
-            method.calibration(&replicates.robot, &input.geometry, input.side_m, (cw.of(lane), ccw.of(lane)))
-        }
-        _ => method.calibrate(&[replicates.dataset(lane).session()]),
-    };
-    (0..LANES).map(calibrated).collect()
+    std::array::from_fn(|lane| {
+        let ([cw, ccw], input) = lanes.as_ref()?;
+        let is_regular = cw.is_finite(lane) && ccw.is_finite(lane);
+        let InputLanes { geometry, side_m, .. } = input;
+        is_regular.then(|| calibration(form, &replicates.robot, geometry, *side_m, (cw.of(lane), ccw.of(lane))))
+    })
 }
 
 /// What the method looks at.
