@@ -194,10 +194,11 @@ pub trait Formula<const N: usize> {
 }
 
 /// A formula of W lanes side by side, in lanes beyond the reach of [`BranchFree`] by itself: the same bits
-/// for any W. Into arrays that are there: to make and to copy some costs as much as a short formula.
+/// for any W. By value, here and below: arrays that nobody has an address of the compiler knows to be apart
+/// from what the formula reads, and only then it makes vectors of the loop.
 #[inline(always)]
-pub fn by_lanes<const W: usize, const N: usize>(formula: &impl Formula<N>, values: &mut [[f64; W]; N]) {
-    let mut outside = [0; W];
+pub fn by_lanes<const W: usize, const N: usize>(formula: &impl Formula<N>) -> [[f64; W]; N] {
+    let (mut values, mut outside) = ([[0.0; W]; N], [0; W]);
     for lane in 0..W {
         let elementary = BranchFree::default();
         let of = formula.of(lane, &elementary);
@@ -207,11 +208,11 @@ pub fn by_lanes<const W: usize, const N: usize>(formula: &impl Formula<N>, value
         outside[lane] = elementary.outside();
     }
     if outside.iter().fold(0, |any, outside| any | outside) != 0 {
-        *values = one_by_one(formula, outside, *values);
+        values = one_by_one(formula, outside, values);
     }
+    values
 }
 
-/// By value: arrays that nobody has an address of do not keep the loop above from becoming vectors.
 #[cold]
 #[inline(never)]
 fn one_by_one<const W: usize, const N: usize>(
@@ -275,8 +276,7 @@ mod tests {
         #[test]
         fn lanes_have_the_values_of_one_argument_at_a_time(numbers in prop::collection::vec((number(), number()), 16)) {
             let numbers: Vec<[f64; 2]> = numbers.into_iter().map(|(x, y)| [x, y]).collect();
-            let mut found = [[0.0; 16]; 10];
-            by_lanes(&Everything(&numbers), &mut found);
+            let found: [[f64; 16]; 10] = by_lanes(&Everything(&numbers));
             for lane in 0..16 {
                 for (found, expected) in found.iter().zip(Everything(&numbers).of(lane, &Branching)) {
                     let found = found[lane];

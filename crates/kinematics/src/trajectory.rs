@@ -77,19 +77,19 @@ impl Odometry {
             theta_rad: [start.theta_rad; W],
         };
         let mut places = [[start.x_m, start.y_m].map(CompensatedSum::at); W];
-        let (mut moved, mut moved_m) = ([[0.0; W]; 3], [[0.0; W]; 2]);
+        let mut moved_m = [[0.0; W]; 2];
         for (row, counts) in counts.enumerate() {
             if row == 0 {
                 (step.first, step.before) = (counts, counts);
                 continue;
             }
             step.now = counts;
-            by_lanes(&step, &mut moved);
+            let [dx_m, dy_m, theta_rad] = by_lanes(&step);
             for lane in 0..W {
-                moved_m[0][lane] += moved[0][lane];
-                moved_m[1][lane] += moved[1][lane];
+                moved_m[0][lane] += dx_m[lane];
+                moved_m[1][lane] += dy_m[lane];
             }
-            (step.before, step.theta_rad) = (counts, moved[2]);
+            (step.before, step.theta_rad) = (counts, theta_rad);
             if row % GROUP == 0 {
                 for (lane, place) in places.iter_mut().enumerate() {
                     for (place, moved_m) in place.iter_mut().zip(&mut moved_m) {

@@ -7,9 +7,8 @@
 
 use dataset::{ReplicatedReading, ReplicatedRun, Replicates, RunInfo};
 use effects::{Address, LaneForm, NormalTable, StreamLanes, StreamName, StreamsLanes};
-use kinematics::by_lanes;
 use kinematics::{
-    BridgeCovariance, Elementary, Formula, Frame, Increment, InstructionSet, Kernel, Point, Pose, Wheels,
+    BridgeCovariance, Elementary, Formula, Frame, Increment, InstructionSet, Kernel, Point, Pose, Wheels, by_lanes,
 };
 use scenario::Placement;
 
@@ -64,16 +63,35 @@ impl LaneDrive {
         }
     }
 
-    /// Drives trial `first` and the W − 1 that follow it, into what [`Self::replicates`] made.
-    pub fn drive_into<const W: usize>(&self, first: u64, replicates: &mut Replicates<W>) {
+    /// Drives trial `first` and those that follow it, into what [`Self::replicates`] made. Not generic: the
+    /// loops are compiled in this crate, where they are optimised.
+    pub fn drive_into(&self, first: u64, replicates: &mut Replicates) {
         self.drive_into_by(InstructionSet::widest(), first, replicates);
     }
 
-    /// [`Self::drive_into`] by a given instruction set: the same bits, at another speed.
-    pub fn drive_into_by<const W: usize>(&self, set: InstructionSet, first: u64, replicates: &mut Replicates<W>) {
-        for (number, ((_, plan), run)) in (0..).zip(self.runs.iter().zip(&mut replicates.runs)) {
-            let address = Address { trial: first, run: number, ..self.address };
-            set.run(DriveRun { drive: self, plan, address, run });
+    /// [`Self::drive_into`] by a given instruction set, for any number of lanes: the same bits.
+    fn drive_into_by<const W: usize>(&self, set: InstructionSet, first: u64, replicates: &mut Replicates<W>) {
+        set.run(DriveRuns { drive: self, first, runs: &mut replicates.runs });
+    }
+}
+
+/// All runs of all lanes.
+struct DriveRuns<'d, const W: usize> {
+    drive: &'d LaneDrive,
+    first: u64,
+    runs: &'d mut [ReplicatedRun<W>],
+}
+
+impl<const W: usize> Kernel for DriveRuns<'_, W> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let table = NormalTable::load();
+        let Self { drive, first, runs } = self;
+        for (number, ((_, plan), run)) in (0..).zip(drive.runs.iter().zip(runs)) {
+            let address = Address { trial: first, run: number, ..drive.address };
+            DriveRun { drive, plan, address, run }.go(&table);
         }
     }
 }
@@ -93,15 +111,12 @@ struct SeparationLanes<const W: usize> {
     now_m: [f64; W],
 }
 
-impl<const W: usize> Kernel for DriveRun<'_, W> {
-    type Output = ();
-
+impl<const W: usize> DriveRun<'_, W> {
     #[inline(always)]
-    fn call(self) {
+    fn go(self, table: &NormalTable) {
         let Self { drive: LaneDrive { setup, placement, counts_per_turn, .. }, plan, address, run } = self;
-        let table = NormalTable::load();
         let streams = StreamsLanes::<W>::of(&address);
-        let mut separations = self.drive.separations(&streams, &table);
+        let mut separations = self.drive.separations(&streams, table);
         let mut grids = Vec::with_capacity(self.drive.grids.len());
         for (name, grid) in &self.drive.grids {
             grids.push((streams.stream(*name), *grid));
@@ -120,13 +135,12 @@ impl<const W: usize> Kernel for DriveRun<'_, W> {
         scale(&mut counts.left, *counts_per_turn);
         scale(&mut counts.right, *counts_per_turn);
 
-        let (mut frame, mut rolled) = ([[0.0; W]; 5], [[0.0; W]; 5]);
-        by_lanes(&start, &mut frame);
-        let (mut room_m, mut readings) = ([[0.0; W]; 2], run.point_readings.iter_mut());
+        let mut frame = by_lanes(&start);
+        let mut readings = run.point_readings.iter_mut();
         for (interval, ticks) in plan.intervals.iter().zip(&mut run.ticks) {
             if interval.sets_out {
                 for separation in &mut separations {
-                    let [mut draws] = separation.stream.normals(&table);
+                    let [mut draws] = separation.stream.normals(table);
                     scale(&mut draws, separation.sigma_m);
                     separation.now_m = draws;
                 }
@@ -137,7 +151,7 @@ impl<const W: usize> Kernel for DriveRun<'_, W> {
                 let travel_m = setup.true_radius_m.zip_with(shaft_rad, |radius_m, turn_rad| radius_m * turn_rad);
                 let travel_var_m2 = setup.noise.travel_var_m2(travel_m);
                 let is_noisy = travel_var_m2.left > 0.0 || travel_var_m2.right > 0.0;
-                let draws = if is_noisy { wheel_noise.normals(&table) } else { [[0.0; W]; 4] };
+                let draws = if is_noisy { wheel_noise.normals(table) } else { [[0.0; W]; 4] };
                 let mut separation_m = [setup.wheel_separation_m; W];
                 for separation in &separations {
                     #[allow(clippy::needless_range_loop)] // arrays side by side
@@ -147,19 +161,30 @@ impl<const W: usize> Kernel for DriveRun<'_, W> {
                 }
                 let step =
                     RolledFrame { frame: &frame, draws: &draws, separation_m: &separation_m, travel_m, travel_var_m2 };
-                by_lanes(&step, &mut rolled);
-                frame = rolled;
+                frame = by_lanes(&step);
                 add(&mut counts.left, shaft_rad.left * setup.counts_per_rad);
                 add(&mut counts.right, shaft_rad.right * setup.counts_per_rad);
             }
             *ticks = Wheels { left: self.drive.ticks(&counts.left), right: self.drive.ticks(&counts.right) };
             if interval.is_read {
                 for (stream, grid) in &mut grids {
-                    for (point, reading) in setup.points.iter().zip(&mut readings) {
-                        let draws = stream.normals(&table);
-                        let mark = MarkReading { frame: &frame, draws: &draws, mark: point.body, grid: *grid };
-                        by_lanes(&mark, &mut room_m);
-                        [reading.x_m, reading.y_m] = room_m;
+                    // By twos, as robots have marks: their draws together are worth more than one by one.
+                    let (twos, last) = setup.points.as_chunks::<2>();
+                    for marks in twos {
+                        let [x, y, second_x, second_y] = stream.normals(table);
+                        for (mark, draws) in marks.iter().zip([[x, y], [second_x, second_y]]) {
+                            let mark = MarkReading { frame: &frame, draws: &draws, mark: mark.body, grid: *grid };
+                            if let Some(reading) = readings.next() {
+                                [reading.x_m, reading.y_m] = by_lanes(&mark);
+                            }
+                        }
+                    }
+                    for mark in last {
+                        let draws = stream.normals(table);
+                        let mark = MarkReading { frame: &frame, draws: &draws, mark: mark.body, grid: *grid };
+                        if let Some(reading) = readings.next() {
+                            [reading.x_m, reading.y_m] = by_lanes(&mark);
+                        }
                     }
                 }
             }
@@ -185,15 +210,12 @@ impl LaneDrive {
     /// What the log shows of a counter.
     #[inline(always)]
     fn ticks<const W: usize>(&self, counts: &[f64; W]) -> [f64; W] {
-        let mut ticks = [[0.0; W]];
-        by_lanes(&WholeCounts { counts }, &mut ticks);
+        let [mut ticks] = by_lanes(&WholeCounts { counts });
         for (_, form) in &self.effects {
             if let LaneForm::Ticks { counts } = *form {
-                let [whole_counts] = ticks;
-                by_lanes(&WholeTicks { counts: &whole_counts, counts_per_tick: f64::from(counts) }, &mut ticks);
+                [ticks] = by_lanes(&WholeTicks { counts: &ticks, counts_per_tick: f64::from(counts) });
             }
         }
-        let [ticks] = ticks;
         ticks
     }
 }

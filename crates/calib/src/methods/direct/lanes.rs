@@ -137,8 +137,8 @@ impl<const W: usize> ColumnLanes<W> {
     }
 
     #[inline(always)]
-    fn push(&mut self, values: &[f64; W], stated_sigma: &[f64; W]) {
-        self.values.push(*values);
+    fn push(&mut self, values: [f64; W], stated_sigma: [f64; W]) {
+        self.values.push(values);
         #[allow(clippy::needless_range_loop)] // arrays side by side
         for lane in 0..W {
             self.stated_sigma[lane] = self.stated_sigma[lane].max(stated_sigma[lane]);
@@ -233,11 +233,10 @@ impl<const W: usize> Kernel for Estimate<'_, '_, W> {
         let chord_sigma_m = 2_f64.sqrt() * mark_sigma_m;
         let mut left = ColumnLanes::with_capacity(straights.len());
         let mut right = ColumnLanes::with_capacity(straights.len());
-        let mut straight = [[0.0; W]; 4];
         for run in straights {
-            by_lanes(&Straight { run, chord_sigma_m }, &mut straight);
-            left.push(&straight[0], &straight[2]);
-            right.push(&straight[1], &straight[3]);
+            let [left_m, right_m, left_sigma_m, right_sigma_m] = by_lanes(&Straight { run, chord_sigma_m });
+            left.push(left_m, left_sigma_m);
+            right.push(right_m, right_sigma_m);
         }
         left.check(&mut is_regular);
         right.check(&mut is_regular);
@@ -247,14 +246,12 @@ impl<const W: usize> Kernel for Estimate<'_, '_, W> {
         let m_per_rad = Wheels { left: left.summary.mean, right: right.summary.mean };
         let mut base = ColumnLanes::with_capacity(spins.len());
         let mut slopes = Wheels { left: Vec::with_capacity(spins.len()), right: Vec::with_capacity(spins.len()) };
-        let mut found = [[0.0; W]; 5];
         for run in spins {
             let spin = SpinLanes { run, geometry, m_per_rad: &m_per_rad, mark_sigma_m: *mark_sigma_m };
-            by_lanes(&spin, &mut found);
-            let [base_m, slope_left, slope_right, sigma_m, turn_rad] = &found;
+            let [base_m, slope_left, slope_right, sigma_m, turn_rad] = by_lanes(&spin);
             base.push(base_m, sigma_m);
-            slopes.left.push(*slope_left);
-            slopes.right.push(*slope_right);
+            slopes.left.push(slope_left);
+            slopes.right.push(slope_right);
             for lane in 0..W {
                 is_regular[lane] &= turn_rad[lane].abs() > MIN_SPIN_RAD;
             }

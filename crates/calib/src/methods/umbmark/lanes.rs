@@ -134,15 +134,14 @@ impl<const W: usize> InputLanes<'_, W> {
         let (mut x_m, mut y_m) = (Vec::with_capacity(squares.len()), Vec::with_capacity(squares.len()));
         for square in squares {
             // In the start's frame the odometry starts at the origin and the first leg points along +x.
-            let mut error_m = [[0.0; W]; 2];
-            by_lanes(&MeasuredEnd(square), &mut error_m);
+            let [mut x_error_m, mut y_error_m] = by_lanes(&MeasuredEnd(square));
             let dead_reckoned = self.odometry.final_midpoint_poses(Pose::IDENTITY, square.ticks.iter().copied());
             for lane in 0..W {
-                error_m[0][lane] -= dead_reckoned[lane].x_m;
-                error_m[1][lane] -= dead_reckoned[lane].y_m;
+                x_error_m[lane] -= dead_reckoned[lane].x_m;
+                y_error_m[lane] -= dead_reckoned[lane].y_m;
             }
-            x_m.push(error_m[0]);
-            y_m.push(error_m[1]);
+            x_m.push(x_error_m);
+            y_m.push(y_error_m);
         }
         DirectionLanes { x_m: RetainedLanes::all(&x_m).summary(), y_m: RetainedLanes::all(&y_m).summary() }
     }
