@@ -406,6 +406,11 @@ mod tests {
         twice.effects.extend(paper().effects.into_iter().filter(|effect| effect.id() == "quantization"));
         twice.instruments.extend(paper().instruments);
         check::<8>(&twice, "two of each effect and instrument");
+        let mut three = paper();
+        let mut ahead = three.robot.points[0].clone();
+        (ahead.id, ahead.x_m) = ("ahead".to_owned(), 0.2);
+        three.robot.points.push(ahead);
+        check::<8>(&three, "three marks");
     }
 
     #[test]
