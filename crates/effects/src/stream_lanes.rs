@@ -7,7 +7,7 @@
 use crate::Address;
 use crate::stream::{HALF_WIDTHS, LAYERS, Stream, StreamName, mix, next_word, normal_inside, state};
 
-/// The streams of W trials in one run: [`crate::Streams`] of each.
+/// The streams of W trials in one run.
 #[derive(Debug, Clone)]
 pub struct StreamsLanes<const W: usize> {
     seed: u64,
