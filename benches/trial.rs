@@ -1,7 +1,7 @@
 //! One Monte-Carlo trial of the paper (30 straights, 30 spins, 10 squares): driven in closed form and
-//! stepped, calibrated by each method, all of it together beside a bare loop that does the same, and by trials
-//! side by side, a point of a sweep, and the Cramér–Rao bound of one. At last the ratios of these, timed in turn: medians over rounds of
-//! the fastest of five.
+//! stepped, calibrated by each method, all of it together beside a bare loop that does the same and beside
+//! trials side by side, a point of a sweep, and the Cramér–Rao bound of one. At last the ratios of these,
+//! timed in turn: medians over rounds of the fastest of five.
 
 mod yardstick;
 
@@ -59,7 +59,7 @@ fn trial(criterion: &mut Criterion) {
         bencher.iter(|| {
             number += dataset::LANES as u64;
             let replicates = trial.drive_side_by_side(number).expect("goes in lanes");
-            methods.map(|method| method.calibrate_replicates(replicates))
+            methods.map(|method| method.calibrate_replicates(replicates, dataset::LANES))
         });
     });
     group.throughput(Throughput::Elements(1));
@@ -159,7 +159,7 @@ fn ratios(_: &mut Criterion) {
         let of_block_s = fastest_s(20, || {
             number += dataset::LANES as u64;
             let replicates = whole.drive_side_by_side(number).expect("goes in lanes");
-            black_box(methods.map(|method| method.calibrate_replicates(replicates)));
+            black_box(methods.map(|method| method.calibrate_replicates(replicates, dataset::LANES)));
         });
         rounds.push([of_closed_s, of_stepping_s, of_whole_s, of_bare_s, of_block_s / dataset::LANES as f64]);
     }

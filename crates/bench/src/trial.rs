@@ -113,8 +113,9 @@ mod tests {
         for first in (0..3 * LANES as u64).step_by(LANES) {
             let replicates = side_by_side.drive_side_by_side(first).expect("goes in lanes");
             for method in ["direct", "umbmark", "linear"].map(|name| calib::method(name).expect("there")) {
-                let found = method.calibrate_replicates(replicates);
+                let found = method.calibrate_replicates(replicates, LANES);
                 assert_eq!(found.len(), LANES);
+                assert_eq!(method.calibrate_replicates(replicates, 3), found[..3]);
                 for (trial, found) in (first..).zip(found) {
                     let session = [alone.drive(trial).expect("drives")];
                     assert_eq!(found, method.calibrate(&session), "{what}: {} of trial {trial}", method.name());

@@ -329,10 +329,17 @@ pub trait Method: Sync + Send {
     /// [`CalibError`] when the method does not apply to these sessions, with the reason.
     fn calibrate(&self, sessions: &[Session<'_>]) -> Result<Calibration, CalibError>;
 
-    /// Calibrates every trial of replicates, each by itself as [`Self::calibrate`] does. A method that does
-    /// its arithmetic for all lanes at once gives the same bits.
-    fn calibrate_replicates(&self, replicates: &Replicates) -> Vec<Result<Calibration, CalibError>> {
-        (0..LANES).map(|lane| self.calibrate(&[replicates.dataset(lane).session()])).collect()
+    /// Calibrates the first `trials` of replicates, at most [`LANES`], each as [`Self::calibrate`] does.
+    fn calibrate_replicates(&self, replicates: &Replicates, trials: usize) -> Vec<Result<Calibration, CalibError>> {
+        let of_lanes = self.calibrate_lanes(replicates).into_iter().take(trials).enumerate();
+        let alone = |lane| self.calibrate(&[replicates.dataset(lane).session()]);
+        of_lanes.map(|(lane, found)| found.unwrap_or_else(|| alone(lane))).collect()
+    }
+
+    /// What a method finds that does its arithmetic for all lanes at once, to the bits of
+    /// [`Self::calibrate`]; `None` in a lane that is to be calibrated by itself.
+    fn calibrate_lanes(&self, _replicates: &Replicates) -> [Option<Result<Calibration, CalibError>>; LANES] {
+        [const { None }; LANES]
     }
 }
 

@@ -30,7 +30,7 @@ pub struct Replicates<const W: usize = LANES> {
 pub struct ReplicatedRun<const W: usize = LANES> {
     /// Id and protocol.
     pub info: RunInfo,
-    /// The rows' stamps, seconds.
+    /// The rows' timestamps, seconds.
     pub t_s: Vec<f64>,
     /// Each wheel's ticks, row by row: whole numbers.
     pub ticks: Vec<Wheels<[f64; W]>>,

@@ -97,24 +97,27 @@ impl<const W: usize> StreamLanes<W> {
 
     /// The next draw of every lane, uniform in [0, 1).
     #[inline(always)]
-    pub fn uniform(&mut self, draws: &mut [f64; W]) {
+    pub fn uniform(&mut self) -> [f64; W] {
         /// 2⁻⁵³, which the 53 high bits of a word are counted in.
         const UNIT: f64 = 0.5 * f64::EPSILON;
+        let mut draws = [0.0; W];
         #[allow(clippy::needless_range_loop)] // arrays side by side
         for lane in 0..W {
             let (word, after) = next_word(take(&self.words, lane));
             draws[lane] = UNIT * (word >> 11) as f64;
             put(&mut self.words, lane, after);
         }
+        draws
     }
 
     /// The next draw of every lane, uniform in [−half_width, half_width).
     #[inline(always)]
-    pub fn uniform_about_zero(&mut self, half_width: f64, draws: &mut [f64; W]) {
-        self.uniform(draws);
-        for draw in draws {
+    pub fn uniform_about_zero(&mut self, half_width: f64) -> [f64; W] {
+        let mut draws = self.uniform();
+        for draw in &mut draws {
             *draw = half_width * (2.0 * *draw - 1.0);
         }
+        draws
     }
 }
 
@@ -157,12 +160,10 @@ mod tests {
         fn call(self) -> Vec<[f64; W]> {
             let table = NormalTable::load();
             let mut stream = StreamsLanes::<W>::of(&self.first).stream(StreamName::new("wheel").nth(2));
-            let mut uniform = [0.0; W];
             let mut drawn = Vec::new();
             for _ in 0..10 {
                 drawn.extend(stream.normals::<4>(&table));
-                stream.uniform(&mut uniform);
-                drawn.push(uniform);
+                drawn.push(stream.uniform());
                 drawn.extend(stream.normals::<1>(&table));
             }
             drawn

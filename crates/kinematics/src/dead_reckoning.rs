@@ -7,7 +7,8 @@
 //! and what the sum of these sums drops is carried along: the place's error does not grow with the number of
 //! steps either. `whole_log.rs` does the same with columns.
 
-use crate::trig::{SHIFTER, along, step_sinc};
+use crate::elementary::{Branching, Elementary};
+use crate::trig::SHIFTER;
 use crate::{Pose, Wheels};
 
 /// How one step's wheel travel becomes a displacement.
@@ -104,6 +105,24 @@ impl Odometry {
         self.m_per_count.map(|m_per_count| m_per_count / self.wheel_separation_m)
     }
 
+    /// Displacement along x and y over a step of some counts, by the headings before it and after it, metres
+    /// and radians (paper, eq. 1 to 3).
+    #[inline(always)]
+    pub(crate) fn displacement_m<E: Elementary>(
+        &self,
+        elementary: &E,
+        steps: Wheels<f64>,
+        [before_rad, after_rad]: [f64; 2],
+    ) -> [f64; 2] {
+        let distance_m = 0.5 * (self.m_per_count.right * steps.right + self.m_per_count.left * steps.left);
+        let half_turn_rad = 0.5 * (after_rad - before_rad);
+        let chord_m = match self.rule {
+            Rule::Midpoint => distance_m,
+            Rule::ExactArc => distance_m * elementary.step_sinc(half_turn_rad),
+        };
+        elementary.along(before_rad + half_turn_rad, chord_m)
+    }
+
     /// Starts online dead reckoning at a pose and the counters' readings there.
     #[must_use]
     pub fn start<C: Count>(&self, world_from_body: Pose, counts: Wheels<C>) -> DeadReckoning<C> {
@@ -194,18 +213,10 @@ impl<C: Count> DeadReckoning<C> {
     /// Takes new cumulative counts and returns the new pose (paper, eq. 1 to 3).
     #[inline]
     pub fn update(&mut self, counts: Wheels<C>) -> Pose {
-        let m_per_count = self.odometry.m_per_count;
-        let distance_m = 0.5
-            * (m_per_count.right * counts.right.since(self.counts.right)
-                + m_per_count.left * counts.left.since(self.counts.left));
+        let steps = counts.zip_with(self.counts, C::since);
         let since = counts.zip_with(self.start_counts, C::since);
         let theta_rad = heading_rad(self.start_theta_rad, self.rad_per_count, since.left, since.right);
-        let half_turn_rad = 0.5 * (theta_rad - self.world_from_body.theta_rad);
-        let chord_m = match self.odometry.rule {
-            Rule::Midpoint => distance_m,
-            Rule::ExactArc => distance_m * step_sinc(half_turn_rad),
-        };
-        let [dx_m, dy_m] = along(self.world_from_body.theta_rad + half_turn_rad, chord_m);
+        let [dx_m, dy_m] = self.odometry.displacement_m(&Branching, steps, [self.world_from_body.theta_rad, theta_rad]);
         let [x, y] = &mut self.position;
         x.moved_m += dx_m;
         y.moved_m += dy_m;

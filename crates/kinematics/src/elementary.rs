@@ -9,12 +9,10 @@ use std::cell::Cell;
 use std::f64::consts::{FRAC_PI_4, TAU};
 
 use crate::angle::wrap_to_pi;
-use crate::trig::{self, Direction};
+use crate::trig::{self, Direction, SHIFTER};
 
-/// 1.5·2⁵²: added to a number and taken away again it rounds to whole numbers, halves to even ones.
-const SHIFTER: f64 = 6_755_399_441_055_744.0;
-
-/// Below this the sum with the shifter has no fractions and does not leave its binade.
+/// Below this the sum with [`SHIFTER`], which rounds halves to even numbers, has no fractions and does not
+/// leave its binade.
 const SHIFTS_BELOW: f64 = 1_125_899_906_842_624.0; // 2⁵⁰
 
 /// The functions that formulas need beside sums, products, quotients and roots.
@@ -50,6 +48,14 @@ pub trait Elementary {
     #[inline(always)]
     fn sinc(&self, x: f64) -> f64 {
         Self::choose(x.abs() <= FRAC_PI_4, || trig::small_sinc(x), || self.sin_cos(x).0 / x)
+    }
+
+    /// The cardinal sine of any half turn of a step, to the bits of the shorter polynomial that loops over
+    /// whole logs take where that is.
+    #[inline(always)]
+    fn step_sinc(&self, half_rad: f64) -> f64 {
+        let is_short = half_rad * half_rad <= trig::LARGEST_SHORT_SQUARE;
+        Self::choose(is_short, || trig::short_sinc(half_rad).0, || self.sinc(half_rad))
     }
 
     /// The angle equal to `angle_rad` modulo whole turns that lies nearest to `reference_rad`.
@@ -237,8 +243,8 @@ mod tests {
     /// All functions of two numbers.
     struct Everything<'x>(&'x [[f64; 2]]);
 
-    impl Formula<10> for Everything<'_> {
-        fn of<E: Elementary>(&self, lane: usize, elementary: &E) -> [f64; 10] {
+    impl Formula<11> for Everything<'_> {
+        fn of<E: Elementary>(&self, lane: usize, elementary: &E) -> [f64; 11] {
             let [x, y] = self.0[lane];
             let (sin, cos) = elementary.sin_cos(x);
             let [along_x, along_y] = elementary.along(x, y);
@@ -252,6 +258,7 @@ mod tests {
                 elementary.round(x),
                 elementary.floor(x),
                 elementary.sinc(x),
+                elementary.step_sinc(x),
                 elementary.unwrap_near(x, y),
             ]
         }
@@ -276,7 +283,7 @@ mod tests {
         #[test]
         fn lanes_have_the_values_of_one_argument_at_a_time(numbers in prop::collection::vec((number(), number()), 16)) {
             let numbers: Vec<[f64; 2]> = numbers.into_iter().map(|(x, y)| [x, y]).collect();
-            let found: [[f64; 16]; 10] = by_lanes(&Everything(&numbers));
+            let found: [[f64; 16]; 11] = by_lanes(&Everything(&numbers));
             for lane in 0..16 {
                 for (found, expected) in found.iter().zip(Everything(&numbers).of(lane, &Branching)) {
                     let found = found[lane];

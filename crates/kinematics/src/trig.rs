@@ -48,7 +48,7 @@ const HALF_COSINE: [f64; 6] = [
 ];
 
 /// The square of the largest half turn of a step at which [`short_sinc`] is taken, (¼ rad)².
-const LARGEST_SHORT_SQUARE: f64 = 0.0625;
+pub(crate) const LARGEST_SHORT_SQUARE: f64 = 0.0625;
 
 /// sin x / x = 1 + x²·(U₀ + U₁x² + …) up to ¼ rad, by Remez' exchange to 9e-17.
 const SHORT_SINC: [f64; 4] =
@@ -211,12 +211,6 @@ pub(crate) fn short_sinc(half_rad: f64) -> (f64, u64) {
     (1.0 + square * ((u0 + u1 * square) + square * square * (u2 + u3 * square)), exceeds)
 }
 
-/// The cardinal sine of any half turn, to the bits of [`short_sinc`] where that is.
-#[inline(always)]
-pub(crate) fn step_sinc(half_rad: f64) -> f64 {
-    if half_rad * half_rad <= LARGEST_SHORT_SQUARE { short_sinc(half_rad).0 } else { sinc(half_rad) }
-}
-
 /// Sine and cosine: [`f64::sin_cos`] without a call.
 #[inline]
 #[must_use]
@@ -266,6 +260,7 @@ pub fn atan2(y: f64, x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::elementary::{Branching, Elementary};
     use std::f64::consts::{FRAC_PI_2, PI};
 
     /// How many doubles apart.
@@ -363,7 +358,7 @@ mod tests {
             for x in [x, -x] {
                 assert!((sinc(x) - sinc_series(x)).abs() < 4.0 * f64::EPSILON, "{x}");
                 // A rounding of 1 and the polynomial's 9e-17, under an ulp of 1.
-                assert!((step_sinc(x) - sinc_series(x)).abs() < 2.0 * f64::EPSILON, "{x}");
+                assert!((Branching.step_sinc(x) - sinc_series(x)).abs() < 2.0 * f64::EPSILON, "{x}");
                 assert_eq!(short_sinc(x).1 >> 63 == 1, x.abs() > 0.25, "{x}");
             }
         }

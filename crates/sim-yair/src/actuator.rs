@@ -3,7 +3,7 @@
 //! engines.
 
 use effects::{Command, Step};
-use kinematics::Wheels;
+use kinematics::{Branching, Elementary, Wheels};
 use scenario::Robot;
 
 use crate::servo::{Servo, ServoError, Travel};
@@ -97,20 +97,7 @@ impl Actuator {
 /// The counts that counters show: the largest whole numbers not above. 2⁶³ counts are beyond any run.
 #[inline]
 fn whole_counts(counts: Wheels<f64>) -> Wheels<i64> {
-    /// 1.5·2⁵²: what is added to it is rounded to a whole number, which stands in the low bits.
-    const SHIFTER: f64 = 6_755_399_441_055_744.0;
-    /// Below this the sum with the shifter does not leave its binade.
-    const SHIFTS_BELOW: f64 = 1_125_899_906_842_624.0; // 2⁵⁰
-    if counts.left.abs() < SHIFTS_BELOW && counts.right.abs() < SHIFTS_BELOW {
-        // Without the calls that `floor` is before SSE 4.1, and the limits that a conversion looks at.
-        counts.map(|counts| {
-            let nearest = (counts + SHIFTER) - SHIFTER;
-            let below = if nearest > counts { nearest - 1.0 } else { nearest };
-            (below + SHIFTER).to_bits().cast_signed() - SHIFTER.to_bits().cast_signed()
-        })
-    } else {
-        counts.map(|counts| counts.floor() as i64)
-    }
+    counts.map(|counts| Branching.floor(counts) as i64)
 }
 
 /// The closed form: a piece of constant speed at a time.

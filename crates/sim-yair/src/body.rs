@@ -6,11 +6,18 @@
 //! Without it the spread of UMBmark's results comes out too small.
 
 use dataset::MarkedPoint;
-use effects::{PoseReading, Step, Stream};
+use effects::{PoseReading, Step, Stream, StreamName};
 use kinematics::{BridgeCovariance, Frame, Increment, Pose, WheelNoise, Wheels};
 
 use crate::active::ActiveEffects;
 use crate::actuator::{Profile, ShaftMotion};
+
+/// Where runs begin.
+pub(crate) const PLACEMENT: StreamName = StreamName::new("placement");
+/// How the wheels stand there.
+pub(crate) const WHEEL_PHASE: StreamName = StreamName::new("wheel phase");
+/// The wheels' random walk.
+pub(crate) const WHEEL_NOISE: StreamName = StreamName::new("wheel noise");
 
 /// What is the same in every run of a robot.
 #[derive(Debug, Clone)]
@@ -42,6 +49,18 @@ pub(crate) struct DriveStreams {
     pub(crate) wheel_noise: Stream,
     /// Drawn from only where sensitivities scatter.
     pub(crate) sensitivity: Stream,
+}
+
+/// Wheel travels with their noise, by a draw of each wheel, metres.
+#[inline(always)]
+pub(crate) fn with_noise_m(travel_m: Wheels<f64>, var_m2: Wheels<f64>, [left, right]: [f64; 2]) -> Wheels<f64> {
+    Wheels { left: travel_m.left + var_m2.left.sqrt() * left, right: travel_m.right + var_m2.right.sqrt() * right }
+}
+
+/// How far the noise inside an arc moves its end, along its chord and across it, by a draw of each, metres.
+#[inline(always)]
+pub(crate) fn within_arc_m(bridge: &BridgeCovariance, [along, across]: [f64; 2]) -> [f64; 2] {
+    [bridge.along_var_m2.sqrt() * along, bridge.across_var_m2.sqrt() * across]
 }
 
 /// Where the body is, and how its wheels stand.
@@ -132,16 +151,16 @@ impl Body {
         let (mut travel_m, mut along_m, mut across_m) = (step.travel_m, 0.0, step.lateral_m);
         if var_m2.left > 0.0 || var_m2.right > 0.0 {
             let [left, right] = if setup.closed_form {
-                let scatter = BridgeCovariance::within(step.travel_m, var_m2, step.wheel_separation_m);
                 let [left, right, along, across] = wheel_noise.normals();
-                along_m += scatter.along_var_m2.sqrt() * along;
-                across_m += scatter.across_var_m2.sqrt() * across;
+                let bridge = BridgeCovariance::within(step.travel_m, var_m2, step.wheel_separation_m);
+                let [bridge_along_m, bridge_across_m] = within_arc_m(&bridge, [along, across]);
+                along_m += bridge_along_m;
+                across_m += bridge_across_m;
                 [left, right]
             } else {
                 wheel_noise.normals()
             };
-            travel_m.left += var_m2.left.sqrt() * left;
-            travel_m.right += var_m2.right.sqrt() * right;
+            travel_m = with_noise_m(travel_m, var_m2, [left, right]);
         }
         self.ground_m = self.ground_m.zip_with(travel_m, |sum_m, travel_m| sum_m + travel_m);
         let mut increment = Increment::from_travel(travel_m, step.wheel_separation_m);

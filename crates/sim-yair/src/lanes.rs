@@ -13,17 +13,9 @@ use kinematics::{
 use scenario::Placement;
 
 use crate::actuator::ConstantSpeed;
-use crate::body::DriveSetup;
+use crate::body::{DriveSetup, PLACEMENT, WHEEL_NOISE, WHEEL_PHASE, with_noise_m, within_arc_m};
 use crate::instrument::FloorGrid;
 use crate::precomputed_run::PrecomputedRun;
-
-/// Names of the streams that every robot has.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct RobotStreams {
-    pub(crate) placement: StreamName,
-    pub(crate) wheel_phase: StreamName,
-    pub(crate) wheel_noise: StreamName,
-}
 
 /// A robot and its programs, ready for trials side by side.
 #[derive(Debug, Clone)]
@@ -31,7 +23,6 @@ pub struct LaneDrive {
     pub(crate) setup: DriveSetup,
     pub(crate) placement: Placement,
     pub(crate) counts_per_turn: f64,
-    pub(crate) streams: RobotStreams,
     pub(crate) effects: Vec<(StreamName, LaneForm)>,
     pub(crate) grids: Vec<(StreamName, FloorGrid)>,
     pub(crate) runs: Vec<(RunInfo, PrecomputedRun)>,
@@ -121,21 +112,17 @@ impl<const W: usize> DriveRun<'_, W> {
         for (name, grid) in &self.drive.grids {
             grids.push((streams.stream(*name), *grid));
         }
-        let mut wheel_noise = streams.stream(self.drive.streams.wheel_noise);
-        let mut placed = streams.stream(self.drive.streams.placement);
-        let mut start = StartFrame { pose: [[0.0; W]; 3] };
-        let [x_m, y_m, theta_rad] = &mut start.pose;
-        placed.uniform_about_zero(placement.half_width_m, x_m);
-        placed.uniform_about_zero(placement.half_width_m, y_m);
-        placed.uniform_about_zero(placement.half_width_rad, theta_rad);
-        let mut phase = streams.stream(self.drive.streams.wheel_phase);
-        let mut counts = Wheels { left: [0.0; W], right: [0.0; W] };
-        phase.uniform(&mut counts.left);
-        phase.uniform(&mut counts.right);
+        let mut wheel_noise = streams.stream(WHEEL_NOISE);
+        let mut placed = streams.stream(PLACEMENT);
+        let x_m = placed.uniform_about_zero(placement.half_width_m);
+        let y_m = placed.uniform_about_zero(placement.half_width_m);
+        let theta_rad = placed.uniform_about_zero(placement.half_width_rad);
+        let mut phase = streams.stream(WHEEL_PHASE);
+        let mut counts = Wheels { left: phase.uniform(), right: phase.uniform() };
         scale(&mut counts.left, *counts_per_turn);
         scale(&mut counts.right, *counts_per_turn);
 
-        let mut frame = by_lanes(&start);
+        let mut frame = by_lanes(&StartFrame { pose: [x_m, y_m, theta_rad] });
         let mut readings = run.point_readings.iter_mut();
         for (interval, ticks) in plan.intervals.iter().zip(&mut run.ticks) {
             if interval.sets_out {
@@ -168,23 +155,10 @@ impl<const W: usize> DriveRun<'_, W> {
             *ticks = Wheels { left: self.drive.ticks(&counts.left), right: self.drive.ticks(&counts.right) };
             if interval.is_read {
                 for (stream, grid) in &mut grids {
-                    // By twos, as robots have marks: their draws together are worth more than one by one.
-                    let (twos, last) = setup.points.as_chunks::<2>();
-                    for marks in twos {
-                        let [x, y, second_x, second_y] = stream.normals(table);
-                        for (mark, draws) in marks.iter().zip([[x, y], [second_x, second_y]]) {
-                            let mark = MarkReading { frame: &frame, draws: &draws, mark: mark.body, grid: *grid };
-                            if let Some(reading) = readings.next() {
-                                [reading.x_m, reading.y_m] = by_lanes(&mark);
-                            }
-                        }
-                    }
-                    for mark in last {
+                    for (mark, reading) in setup.points.iter().zip(&mut readings) {
                         let draws = stream.normals(table);
                         let mark = MarkReading { frame: &frame, draws: &draws, mark: mark.body, grid: *grid };
-                        if let Some(reading) = readings.next() {
-                            [reading.x_m, reading.y_m] = by_lanes(&mark);
-                        }
+                        [reading.x_m, reading.y_m] = by_lanes(&mark);
                     }
                 }
             }
@@ -261,12 +235,11 @@ struct RolledFrame<'s, const W: usize> {
 impl<const W: usize> Formula<5> for RolledFrame<'_, W> {
     #[inline(always)]
     fn of<E: Elementary>(&self, lane: usize, elementary: &E) -> [f64; 5] {
-        let Self { mut travel_m, travel_var_m2, .. } = *self;
+        let Self { travel_m, travel_var_m2, .. } = *self;
         let (separation_m, [left, right, along, across]) = (self.separation_m[lane], at(self.draws, lane));
-        let scatter = BridgeCovariance::within_by(elementary, travel_m, travel_var_m2, separation_m);
-        travel_m.left += travel_var_m2.left.sqrt() * left;
-        travel_m.right += travel_var_m2.right.sqrt() * right;
-        let (along_m, across_m) = (scatter.along_var_m2.sqrt() * along, scatter.across_var_m2.sqrt() * across);
+        let bridge = BridgeCovariance::within_by(elementary, travel_m, travel_var_m2, separation_m);
+        let [along_m, across_m] = within_arc_m(&bridge, [along, across]);
+        let travel_m = with_noise_m(travel_m, travel_var_m2, [left, right]);
         let increment = Increment::from_travel(travel_m, separation_m);
         let before_from_after = increment.perturbed_arc_by(elementary, along_m, across_m);
         (Frame::from_numbers(at(self.frame, lane)) * before_from_after).numbers()

@@ -10,10 +10,10 @@ use scenario::{Engine, Instrument, Scenario};
 
 use crate::active::ActiveEffects;
 use crate::actuator::{Actuator, ConstantSpeed, Profile, ServoPair};
-use crate::body::{DriveSetup, DriveStreams, Start};
+use crate::body::{DriveSetup, DriveStreams, PLACEMENT, Start, WHEEL_NOISE, WHEEL_PHASE};
 use crate::drive::Drive;
 use crate::instrument::Observer;
-use crate::lanes::{LaneDrive, RobotStreams};
+use crate::lanes::LaneDrive;
 use crate::planned_motion::PlannedMotion;
 use crate::precomputed_run::PrecomputedRun;
 use crate::prepared_program::PreparedProgram;
@@ -42,9 +42,6 @@ pub enum SimulationError {
     Servo(#[from] ServoError),
 }
 
-const PLACEMENT: StreamName = StreamName::new("placement");
-const WHEEL_PHASE: StreamName = StreamName::new("wheel phase");
-const WHEEL_NOISE: StreamName = StreamName::new("wheel noise");
 const SENSITIVITY: StreamName = StreamName::new("sensitivity");
 
 /// YAIR, or another differential drive, as a scenario describes it, on one trial of its randomness.
@@ -227,7 +224,6 @@ impl SimulatedRobot {
             setup: self.setup.clone(),
             placement: self.placement,
             counts_per_turn: self.robot.encoder.counts_per_wheel_turn(),
-            streams: RobotStreams { placement: PLACEMENT, wheel_phase: WHEEL_PHASE, wheel_noise: WHEEL_NOISE },
             effects: self.effects.lane_forms()?,
             grids: grids.collect::<Option<_>>()?,
             runs: runs.collect::<Option<_>>()?,

@@ -250,7 +250,8 @@ impl Group {
             let block = first..trials.end.min(first + LANES as u64);
             if let Some(replicates) = self.trial.drive_side_by_side(first) {
                 for &number in &self.methods {
-                    let calibrations = plan.methods[number].calibrate_replicates(replicates);
+                    let trials = (block.end - block.start) as usize;
+                    let calibrations = plan.methods[number].calibrate_replicates(replicates, trials);
                     for (trial, calibration) in block.clone().zip(calibrations) {
                         take(trial, number, calibration.ok());
                     }

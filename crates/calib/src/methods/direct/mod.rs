@@ -15,7 +15,7 @@
 mod formulas;
 mod lanes;
 
-use dataset::{PointReading, Protocol, Replicates, RunView, Session};
+use dataset::{LANES, PointReading, Protocol, Replicates, RunView, Session};
 use kinematics::{Branching, DriveGeometry, Point, Side, Wheels};
 use motion_programs::Schedule;
 
@@ -235,9 +235,7 @@ impl Method for Direct {
         Ok(Calibration { runs_used, runs_rejected, ..calibration(&robot, Wheels { left, right }, base, slope)? })
     }
 
-    fn calibrate_replicates(&self, replicates: &Replicates) -> Vec<Result<Calibration, CalibError>> {
-        let found = lanes::calibrations(&self.outliers, replicates).into_iter().enumerate();
-        let alone = |lane| self.calibrate(&[replicates.dataset(lane).session()]);
-        found.map(|(lane, found)| found.unwrap_or_else(|| alone(lane))).collect()
+    fn calibrate_lanes(&self, replicates: &Replicates) -> [Option<Result<Calibration, CalibError>>; LANES] {
+        lanes::calibrations(&self.outliers, replicates)
     }
 }

@@ -135,7 +135,7 @@ impl<const W: usize> InputLanes<'_, W> {
         for square in squares {
             // In the start's frame the odometry starts at the origin and the first leg points along +x.
             let [mut x_error_m, mut y_error_m] = by_lanes(&MeasuredEnd(square));
-            let dead_reckoned = self.odometry.final_midpoint_poses(Pose::IDENTITY, square.ticks.iter().copied());
+            let dead_reckoned = self.odometry.final_poses(Pose::IDENTITY, square.ticks.iter().copied());
             for lane in 0..W {
                 x_error_m[lane] -= dead_reckoned[lane].x_m;
                 y_error_m[lane] -= dead_reckoned[lane].y_m;

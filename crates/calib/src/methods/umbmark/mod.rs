@@ -15,7 +15,7 @@
 mod formulas;
 mod lanes;
 
-use dataset::{Protocol, Replicates, Session};
+use dataset::{LANES, Protocol, Replicates, Session};
 use kinematics::{Pose, Rule};
 use motion_programs::Schedule;
 
@@ -110,9 +110,7 @@ impl Method for Umbmark {
         calibration(self.form, &robot, &geometry, side_m, (cw, ccw))
     }
 
-    fn calibrate_replicates(&self, replicates: &Replicates) -> Vec<Result<Calibration, CalibError>> {
-        let found = lanes::calibrations(self.form, replicates).into_iter().enumerate();
-        let alone = |lane| self.calibrate(&[replicates.dataset(lane).session()]);
-        found.map(|(lane, found)| found.unwrap_or_else(|| alone(lane))).collect()
+    fn calibrate_lanes(&self, replicates: &Replicates) -> [Option<Result<Calibration, CalibError>>; LANES] {
+        lanes::calibrations(self.form, replicates)
     }
 }
