@@ -13,8 +13,8 @@
 use dataset::{Dataset, Session};
 use effects::{CATALOGUE, Hypothesis, hypothesis};
 use estimation::{
-    Column, Information, Model, Noise, NormalEquations, OutlierGate, Records, Selection, Thinning, inverse,
-    pass_with_innovations, total,
+    Column, Information, Model, Noise, NormalEquations, OutlierGate, Pass, Records, Segment, Selection, Thinning,
+    inverse, pass_with_innovations, total,
 };
 use kinematics::{DriveGeometry, Pose, Wheels};
 use model_term::{ModelTerm, TermParameter};
@@ -132,7 +132,8 @@ impl TrueNoise {
 /// Half of the χ² of noise-free runs under a model with terms: what the model costs of the log score, on
 /// average over the measurements' errors.
 pub(crate) fn misfit(datasets: &[Dataset], model: &Model, noise: TrueNoise, terms: &mut [Box<dyn ModelTerm>]) -> f64 {
-    measurement(&records(datasets), model, noise, terms).map_or(0.0, |measured| 0.5 * measured.total.chi_square)
+    let runs = NoiseFree::of(datasets, model, noise, terms);
+    runs.measurement(model, noise, terms).map_or(0.0, |measured| 0.5 * measured.total.chi_square)
 }
 
 /// What a model with terms gains in log score over another without them on noise-free runs, on average over
@@ -189,9 +190,9 @@ pub(crate) fn misfit_of_form(
     let columns: Vec<Column> =
         Column::GEOMETRY.into_iter().chain((0..model.term_values.len()).map(Column::Term)).collect();
     let (mut model, mut least) = (model.clone(), f64::INFINITY);
-    let records = records(datasets);
     for _ in 0..=GAUSS_NEWTON_STEPS {
-        let Some(measured) = measurement(&records, &model, noise, terms) else { return least };
+        let runs = NoiseFree::of(datasets, &model, noise, terms);
+        let Some(measured) = runs.measurement(&model, noise, terms) else { return least };
         least = least.min(0.5 * measured.total.chi_square);
         let Some((step, _)) = measured.total.of(&columns).solve() else { return least };
         columns.iter().zip(step.iter()).for_each(|(column, by)| model.advance(*column, *by));
@@ -204,25 +205,71 @@ struct NoiseFreePass {
     total: NormalEquations,
     /// Whitened innovations, each with its run.
     z: Vec<((usize, usize), f64)>,
+    /// χ² that start headings take up which were not measured.
+    by_headings: f64,
+}
+
+/// Noise-free runs.
+struct NoiseFree<'d> {
+    records: Records<'d>,
+    /// Start headings of segments, radians: those that fit best, where none is measured.
+    headings: Vec<f64>,
+}
+
+/// Start headings are found by so many passes at the most, or until none moves by more.
+const HEADING_PASSES: usize = 4;
+const HEADING_TOLERANCE_RAD: f64 = 1e-9;
+
+impl<'d> NoiseFree<'d> {
+    /// Runs with the headings that fit best under a model.
+    fn of(datasets: &'d [Dataset], model: &Model, noise: TrueNoise, terms: &mut [Box<dyn ModelTerm>]) -> Self {
+        let records = records(datasets);
+        let mut runs = Self { headings: vec![0.0; records.segments.len()], records };
+        if !runs.records.segments.iter().any(Segment::has_free_heading) {
+            return runs;
+        }
+        for _ in 0..HEADING_PASSES {
+            let pass = runs.pass(model, noise, terms);
+            let steps: Vec<(usize, f64)> = pass.heading_steps().collect();
+            steps.iter().for_each(|(segment, step_rad)| runs.headings[*segment] += step_rad);
+            if steps.iter().all(|(_, step_rad)| step_rad.abs() <= HEADING_TOLERANCE_RAD) {
+                break;
+            }
+        }
+        runs
+    }
+
+    /// Other runs with the headings of these.
+    fn beside<'o>(&self, datasets: &'o [Dataset]) -> Option<NoiseFree<'o>> {
+        let records = records(datasets);
+        (records.segments.len() == self.headings.len()).then(|| NoiseFree { records, headings: self.headings.clone() })
+    }
+
+    fn pass(&self, model: &Model, noise: TrueNoise, terms: &mut [Box<dyn ModelTerm>]) -> Pass {
+        let selections = Selection::of(&self.records, Thinning::NONE, model);
+        pass_with_innovations(
+            &self.records,
+            &selections,
+            model,
+            &noise.noise(),
+            &self.headings,
+            terms,
+            OutlierGate::Off,
+        )
+    }
+
+    fn measurement(&self, model: &Model, noise: TrueNoise, terms: &mut [Box<dyn ModelTerm>]) -> Option<NoiseFreePass> {
+        let pass = self.pass(model, noise, terms);
+        let total = total(&pass.runs)?;
+        let run = |segment: usize| self.records.segments[segment].run;
+        let z = pass.innovations.iter().flatten().map(|found| (run(found.segment), found.z)).collect();
+        Some(NoiseFreePass { total, z, by_headings: pass.chi_square_of_headings() })
+    }
 }
 
 fn records(datasets: &[Dataset]) -> Records<'_> {
     let sessions: Vec<Session<'_>> = datasets.iter().map(Dataset::session).collect();
     Records::of(&sessions)
-}
-
-fn measurement(
-    records: &Records<'_>,
-    model: &Model,
-    noise: TrueNoise,
-    terms: &mut [Box<dyn ModelTerm>],
-) -> Option<NoiseFreePass> {
-    let selections = Selection::of(records, Thinning::NONE, model);
-    let headings = vec![0.0; records.segments.len()];
-    let pass = pass_with_innovations(records, &selections, model, &noise.noise(), &headings, terms, OutlierGate::Off);
-    let total = total(&pass.runs)?;
-    let z = pass.innovations.iter().flatten().map(|found| (records.segments[found.segment].run, found.z)).collect();
-    Some(NoiseFreePass { total, z })
 }
 
 /// Steps of Gauss and Newton to the best geometry.
@@ -233,6 +280,11 @@ fn to_best_geometry(total: &NormalEquations, at: &[usize]) -> Option<DVector<f64
     let geometry_parameters = Information { matrix: total.block(at, at), gradient: total.gradient_of(at) };
     let (step, _) = geometry_parameters.with_precision(at.iter().map(|_| GEOMETRY_PRIOR_SD.powi(-2))).solve()?;
     Some(step)
+}
+
+/// Sum of the squares of innovations.
+fn squares(z: &[((usize, usize), f64)]) -> f64 {
+    z.iter().map(|(_, z)| z * z).sum()
 }
 
 /// ½ Σ e² over innovations, e being the mean square of a run's.
@@ -278,32 +330,34 @@ impl Detectability {
         let has_gyro = datasets.iter().any(|dataset| dataset.truth_noise.gyro.noise_rad_per_sqrt_s.is_some());
         let columns: Vec<Column> = Column::GEOMETRY.into_iter().chain(has_gyro.then_some(Column::GyroScale)).collect();
         let free: Vec<usize> = columns.iter().map(|column| column.index()).collect();
-        let (with, without) = (records(datasets), records(without));
         let mut best = Model::of(truth, 0);
+        let without = NoiseFree::of(without, &best, noise, &mut []);
+        let with = without.beside(datasets)?;
         if has_gyro {
             // Its scale and how wrong it is are no signature of the effect's.
             for _ in 0..GAUSS_NEWTON_STEPS {
-                let plain = measurement(&without, &best, noise, &mut [])?;
+                let plain = without.measurement(&best, noise, &mut [])?;
                 let step = to_best_geometry(&plain.total, &[Column::GyroScale.index()])?;
                 best.advance(Column::GyroScale, step[0]);
             }
         }
         let with_terms = |model: &Model| Model { term_values: vec![0.0; at - Column::BASE.len()], ..model.clone() };
-        let plain = measurement(&without, &with_terms(&best), noise, &mut terms)?;
+        let plain = without.measurement(&with_terms(&best), noise, &mut terms)?;
         let mut at_truth = None;
         for _ in 0..GAUSS_NEWTON_STEPS {
-            let measured = measurement(&with, &best, noise, &mut [])?;
+            let measured = with.measurement(&best, noise, &mut [])?;
             at_truth.get_or_insert(measured.total.chi_square);
             let step = to_best_geometry(&measured.total, &free)?;
             columns.iter().zip(step.iter()).for_each(|(column, by)| best.advance(*column, *by));
         }
-        let mut measured = measurement(&with, &with_terms(&best), noise, &mut terms)?;
+        let mut measured = with.measurement(&with_terms(&best), noise, &mut terms)?;
         if measured.z.len() == plain.z.len() {
             measured.total.gradient -= &plain.total.gradient;
             measured.z.iter_mut().zip(&plain.z).for_each(|(measured, plain)| measured.1 -= plain.1);
-            // Partial measurements have no innovations of their own here: χ² is that of their filter.
+            // Partial measurements have no innovations of their own here: χ² is that of their filter. What
+            // start headings that were not measured take up is no signature.
             if !measured.z.is_empty() {
-                measured.total.chi_square = measured.z.iter().map(|(_, z)| z * z).sum();
+                measured.total.chi_square = squares(&measured.z) - measured.by_headings;
             }
         }
         let at_truth = at_truth.unwrap_or(0.0);

@@ -116,7 +116,9 @@ pub(crate) fn alternatives(
             } else if entry.scored.dimensions == 0 {
                 Status::NotDetectable
             } else if entry.p_value * tests > SCAN_LEVEL {
-                Status::NotSignificant
+                // By its score; refitted it may have been.
+                let of_refit = found.refusals.get(id).filter(|refusal| refusal.is_for_other_runs());
+                of_refit.map_or(Status::NotSignificant, |refusal| Status::Refused(*refusal))
             } else {
                 found.refusals.get(id).map_or(Status::ExplainsLess, |refusal| Status::Refused(*refusal))
             };

@@ -32,6 +32,7 @@ mod heterogeneity;
 mod kinds;
 mod large_errors;
 mod large_log;
+mod likelihood_ratio;
 mod log_rows;
 mod map_errors;
 mod mean_lateness;

@@ -9,6 +9,7 @@ use crate::augmented_model::{AugmentedModel, refit};
 use crate::candidate::Candidate;
 use crate::fit_cache::FitCache;
 use crate::gain::gain;
+use crate::likelihood_ratio::significant_once_refitted;
 use crate::model_comparison::{form_error_statistic, log_bayes_factor, log_odds_margin, regated};
 use crate::profile::fit_variant;
 use crate::ranking::{Entry, best_variants, tests_in};
@@ -55,7 +56,8 @@ fn grown<'a>(
 ) -> Option<AugmentedModel<'a>> {
     let (tests, index) = (tests_in(&entries), model.candidates.len());
     for _ in 0..MAX_CANDIDATES_TRIED {
-        let best = most_significant(&entries, tests, level)?;
+        let best = most_significant(&entries, tests, level)
+            .or_else(|| significant_once_refitted((base, &mut *known), model, &entries, (tests, level)))?;
         let (id, statistic) = (best.scored.candidate.id(), best.scored.statistic);
         let found = rivals((base, &mut *known), model, index, &entries, statistic, refusals);
         let refuted = match found.into_iter().next().filter(|(name, _)| name.log_odds > 0.0) {

@@ -29,6 +29,31 @@ pub(crate) fn p_of_score(statistic: f64, dimensions: usize, count: f64, freedom:
     p_of_statistic(left * share / (1.0 - share), dimensions, left)
 }
 
+/// p-value of a refit, from the score's statistic and the likelihood ratio: F of a regression whose variance
+/// is estimated from n values, of which the score is n R² and the ratio −n ln(1 − R²); χ² of the ratio where
+/// it is no larger.
+pub(crate) fn p_of_ratio(score: f64, ratio: f64, dimensions: usize) -> f64 {
+    if dimensions == 0 || !score.is_finite() || !ratio.is_finite() {
+        return 1.0;
+    }
+    if ratio <= score {
+        return p_of_chi_square(ratio, dimensions as f64);
+    }
+    // score/ratio = R²/−ln(1 − R²), which falls from 1 to 0.
+    let quotient = |share: f64| share / -(-share).ln_1p();
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..SHARE_BISECTIONS {
+        let share = 0.5 * (low + high);
+        if quotient(share) * ratio > score { low = share } else { high = share }
+    }
+    let share = 0.5 * (low + high);
+    let left = score / share - dimensions as f64;
+    if left < 1.0 { 1.0 } else { p_of_statistic(left * share / (1.0 - share), dimensions, left) }
+}
+
+/// Halvings that find a share to 1e-9.
+const SHARE_BISECTIONS: u32 = 30;
+
 /// p-value of a χ² variable.
 pub(crate) fn p_of_chi_square(statistic: f64, freedom: f64) -> f64 {
     ChiSquared::new(freedom.max(1.0)).map_or(1.0, |chi| chi.sf(statistic.max(0.0)))
@@ -106,6 +131,22 @@ mod tests {
         for freedom in [1e6, 1e7, 1e9] {
             assert!((student_95(freedom) - 1.959_964).abs() < 3e-5, "{freedom}: {}", student_95(freedom));
         }
+    }
+
+    /// Ten values of which a regression explains the share 0.8: score 8, ratio −10 ln 0.2 = 16.09, and F of
+    /// one and nine degrees of freedom 9 · 0.8/0.2 = 36, which is t = 6 of nine.
+    #[test]
+    fn a_score_and_a_likelihood_ratio_say_how_many_values_there_are() {
+        let found = p_of_ratio(8.0, -10.0 * 0.2_f64.ln(), 1);
+        assert!((found / p_of_student(6.0, 9.0) - 1.0).abs() < 1e-5, "{found}");
+        // Between χ² of the ratio and χ² of the score.
+        assert!(found > p_of_chi_square(16.09, 1.0) && found < p_of_chi_square(8.0, 1.0), "{found}");
+        // Of very many values both are χ². Rejects a share that is found to a thousandth.
+        let many = p_of_ratio(20.0, -1e5 * (1.0 - 2e-4_f64).ln(), 1);
+        assert!((many / p_of_chi_square(20.0, 1.0) - 1.0).abs() < 1e-2, "{many}");
+        // A ratio that is no larger than the score is χ² by itself.
+        assert_eq!(p_of_ratio(8.0, 5.0, 2), p_of_chi_square(5.0, 2.0));
+        assert_eq!((p_of_ratio(8.0, 5.0, 0), p_of_ratio(f64::NAN, 5.0, 1)), (1.0, 1.0));
     }
 
     #[test]

@@ -85,10 +85,10 @@ impl ModelFit<'_> {
             let own = std::slice::from_ref(selection);
             let mut found = pass(&self.records, own, model, noise, &headings, terms, pass_options);
             for _ in 0..MAX_UNGATED_STEPS {
-                if found.headings.iter().all(|heading| heading.rest.abs() < HEADING_STEP_TOLERANCE_RAD) {
+                if found.headings.iter().all(|heading| heading.response.rest.abs() < HEADING_STEP_TOLERANCE_RAD) {
                     break;
                 }
-                found.headings.iter().for_each(|heading| headings[heading.segment] += heading.rest);
+                found.headings.iter().for_each(|heading| headings[heading.segment] += heading.response.rest);
                 found = pass(&self.records, own, model, noise, &headings, terms, pass_options);
             }
             if sum.is_empty() {

@@ -11,6 +11,7 @@ use crate::noise::{Noise, NoisePrior};
 use crate::normal_equations::{Information, free_basis, total};
 use crate::pass::{FreeHeading, Pass, pass};
 use crate::pass_options::{OutlierGate, PassOptions};
+use crate::products::HeadingResponse;
 use crate::propagation::CachedPropagation;
 use crate::records::Records;
 use crate::segment::Segment;
@@ -252,7 +253,7 @@ pub(crate) fn pass_settled(
     let mut headings: Vec<f64> = records.segments.iter().map(|segment| start_heading(segment, &model, 0)).collect();
     for round in 1.. {
         let found = pass(records, selections, &model, noise, &headings, &mut [], PassOptions::default());
-        let turned = found.headings.iter().map(|heading| heading.rest.abs()).fold(0.0, f64::max);
+        let turned = found.headings.iter().map(|heading| heading.response.rest.abs()).fold(0.0, f64::max);
         let mut next = model.clone();
         let (_, own) = take_step(&mut next, &mut headings, &found, &options, DVector::zeros(0))?;
         if (turned < HEADING_STEP_TOLERANCE_RAD && own < MEAN_STEP_TOLERANCE) || round == MAX_UNGATED_STEPS {
@@ -333,7 +334,7 @@ fn take_step(
     }
     let own_steps: Vec<DVector<f64>> =
         found.own.iter().map(|response| response.step(&options.columns, &step)).collect();
-    for FreeHeading { segment, run, rest, by } in &found.headings {
+    for FreeHeading { segment, run, response: HeadingResponse { rest, by, .. } } in &found.headings {
         let mut shift: f64 = by.iter().zip(&moved).map(|(by, moved)| by * moved).sum();
         if let Some(own) = &model.own
             && let Some(at) = found.own.iter().position(|response| response.group == own.grouping.group(*run))

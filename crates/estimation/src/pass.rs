@@ -22,7 +22,7 @@ use crate::partial_observation::Quantity;
 use crate::partial_poses::TakenPoses;
 use crate::partial_records::PartialSegment;
 use crate::pass_options::{OutlierGate, PassOptions};
-use crate::products::Products;
+use crate::products::{HeadingResponse, Products};
 use crate::propagation::{CachedPropagation, CarriedState, PropagationSource, SegmentCache};
 use crate::records::Records;
 use crate::segment::{Segment, Start};
@@ -61,13 +61,21 @@ pub struct Pass {
 pub(crate) struct FreeHeading {
     pub(crate) segment: usize,
     pub(crate) run: (usize, usize),
-    /// Its own step, radians.
-    pub(crate) rest: f64,
-    /// Its step by each column.
-    pub(crate) by: Vec<f64>,
+    pub(crate) response: HeadingResponse,
 }
 
 impl Pass {
+    /// Steps of the start headings that were not measured: segment, and radians.
+    pub fn heading_steps(&self) -> impl Iterator<Item = (usize, f64)> {
+        self.headings.iter().map(|heading| (heading.segment, heading.response.rest))
+    }
+
+    /// χ² that start headings which were not measured take up.
+    #[must_use]
+    pub fn chi_square_of_headings(&self) -> f64 {
+        self.headings.iter().map(|heading| heading.response.information * heading.response.rest.powi(2)).sum()
+    }
+
     /// Of no run.
     pub(crate) fn nothing() -> Self {
         Self {
@@ -224,9 +232,9 @@ pub(crate) fn pass(
             innovations.extend(of.innovations);
             samples.extend(of.samples);
             rejected.extend(of.outliers.into_iter().map(|measurement| (of.number, measurement)));
-            if let (0, Some((rest, by))) = (phase, of.heading) {
+            if let (0, Some(response)) = (phase, of.heading) {
                 let run = records.segments[of.number].run;
-                result.headings.push(FreeHeading { segment: of.number, run, rest, by });
+                result.headings.push(FreeHeading { segment: of.number, run, response });
             }
             result.noise.add(&of.noise_score, weight);
             result.timing.add(&of.timing, weight);
@@ -343,7 +351,7 @@ fn runs(segments: &[Segment<'_>]) -> Vec<Range<usize>> {
 #[derive(Clone)]
 struct OfSegment {
     number: usize,
-    heading: Option<(f64, Vec<f64>)>,
+    heading: Option<HeadingResponse>,
     innovations: Vec<InnovationComponent>,
     samples: Vec<KinematicSample>,
     outliers: Vec<usize>,

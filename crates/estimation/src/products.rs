@@ -151,9 +151,9 @@ impl<'p> Sums<'p> {
         information
     }
 
-    /// The normal equation with the free heading eliminated, and the heading's response: its own step, and
-    /// that by each column. What is not carried is zero.
-    pub(crate) fn eliminated(&self, run: (usize, usize)) -> (NormalEquations, Option<(f64, Vec<f64>)>) {
+    /// The normal equation with the free heading eliminated, and the heading's response. What is not carried is
+    /// zero.
+    pub(crate) fn eliminated(&self, run: (usize, usize)) -> (NormalEquations, Option<HeadingResponse>) {
         let layout = self.products.layout;
         let carried = layout.columns();
         let of_equations = |of: &[f64]| {
@@ -185,8 +185,19 @@ impl<'p> Sums<'p> {
         equations.chi_square -= gradient * gradient / own;
         equations.log_det += own.ln();
         equations.count -= 1.0;
-        (equations, Some((-gradient / own, by)))
+        (equations, Some(HeadingResponse { rest: -gradient / own, by, information: own }))
     }
+}
+
+/// Response of a free start heading.
+#[derive(Debug, Clone)]
+pub(crate) struct HeadingResponse {
+    /// Its own step, radians.
+    pub(crate) rest: f64,
+    /// Its step by each column.
+    pub(crate) by: Vec<f64>,
+    /// Its information, 1/rad².
+    pub(crate) information: f64,
 }
 
 // Loops, and no closures over arrays: these would be called, and compiled without the kernel's instructions.

@@ -63,7 +63,8 @@ impl Segment<'_> {
     }
 
     /// Does it start at a measured position without a heading, which is a parameter then?
-    pub(crate) fn has_free_heading(&self) -> bool {
+    #[must_use]
+    pub fn has_free_heading(&self) -> bool {
         self.start == Start::MeasuredPose
             && self.measurements.first().is_some_and(|measurement| measurement.theta_rad.is_none())
     }

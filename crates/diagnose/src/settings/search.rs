@@ -64,6 +64,14 @@ pub(crate) const MIN_TAKEN_FRACTION: f64 = 0.5;
 /// Tuned: by hand; no record of what on.
 pub(crate) const MAX_CANDIDATES_TRIED: usize = 3;
 
+/// Probability. Where no score is significant among all, candidates are refitted whose own is so far.
+/// Budgeted: one in four logs without an effect has one.
+pub(crate) const REFITTED_LEVEL: f64 = 0.01;
+
+/// Number. So many of these are refitted at the most.
+/// Budgeted: a refit costs as much as a scan, and causes that are alike have the same ratio.
+pub(crate) const MAX_REFITTED_BY_SCORE: usize = 3;
+
 /// Share of the motion in a term's information, the rest being the rounding of counts in the rates that it
 /// goes by, below which the encoders do not resolve it.
 /// Budgeted: below it a size is nearer to nothing than to the truth. At 0.9 drifting clocks and delays that

@@ -24,7 +24,8 @@ fn columns() -> Vec<Column> {
 fn found() -> Pass {
     let run = |number| NormalEquations::new((0, number), Column::BASE.len());
     let by = vec![0.5, -1.0, 2.0, 4.0, 8.0, 16.0, -32.0, 64.0];
-    let headings = vec![FreeHeading { segment: 1, run: (0, 1), rest: 0.25, by }];
+    let response = HeadingResponse { rest: 0.25, by, information: 1.0 };
+    let headings = vec![FreeHeading { segment: 1, run: (0, 1), response }];
     Pass { runs: vec![run(0), run(1)], headings, ..Pass::nothing() }
 }
 

@@ -331,22 +331,28 @@ fn the_noise_score_is_the_derivative_of_the_cost() {
 #[test]
 fn a_free_heading_is_at_its_best() {
     let dataset = dataset(false);
-    let pass_options = PassOptions { gate: OutlierGate::Off, ..PassOptions::default() };
+    let pass_options = PassOptions { gate: OutlierGate::Off, innovations: true, ..PassOptions::default() };
     let mut headings = [0.6, 1.6];
     for _ in 0..8 {
         let found = run(&dataset, &CENTRED_MODEL, &NOISE, &headings, pass_options);
-        for crate::pass::FreeHeading { segment, rest, .. } in &found.headings {
-            headings[*segment] += rest;
+        for (segment, rest_rad) in found.heading_steps() {
+            headings[segment] += rest_rad;
         }
     }
     let at_best = run(&dataset, &CENTRED_MODEL, &NOISE, &headings, pass_options);
-    assert!(at_best.headings.iter().all(|heading| heading.rest.abs() < 1e-9), "{:?}", at_best.headings);
+    assert!(at_best.headings.iter().all(|heading| heading.response.rest.abs() < 1e-9), "{:?}", at_best.headings);
     // Runs start at 0.5 and 1.5 rad; measurements of 3 mm over half a metre determine a heading to 0.01 rad.
     assert!((headings[0] - 0.5).abs() < 0.03 && (headings[1] - 1.5).abs() < 0.03, "{headings:?}");
     let off = run(&dataset, &CENTRED_MODEL, &NOISE, &[headings[0] + 0.01, headings[1]], pass_options);
     // To second order the elimination undoes the move.
     assert!((cost(&off) - cost(&at_best)).abs() < 0.05 * cost(&at_best).abs(), "{} {}", cost(&off), cost(&at_best));
-    assert!(off.headings[0].rest < -0.009);
+    assert!(off.headings[0].response.rest < -0.009);
+    // What the heading takes up is what the innovations have more than the sums.
+    let (mut total, mut squares) = (0.0, 0.0);
+    off.runs.iter().for_each(|run| total += run.chi_square);
+    off.innovations.iter().flatten().for_each(|component| squares += component.z.powi(2));
+    let taken = off.chi_square_of_headings();
+    assert!(taken > 1.0 && (squares - total - taken).abs() < 1e-9 * squares, "{squares} {total} {taken}");
 }
 
 #[test]
