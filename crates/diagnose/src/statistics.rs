@@ -6,6 +6,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Normal, St
 use statrs::function::erf::erfc_inv;
 
 use crate::settings::levels::MAX_STUDENT_FREEDOM;
+use crate::settings::search::SHARE_BISECTIONS;
 
 /// p-value of a sum of `dimensions` squared normal variables over their variance, when the variance was
 /// estimated from about `freedom` values.
@@ -50,9 +51,6 @@ pub(crate) fn p_of_ratio(score: f64, ratio: f64, dimensions: usize) -> f64 {
     let left = score / share - dimensions as f64;
     if left < 1.0 { 1.0 } else { p_of_statistic(left * share / (1.0 - share), dimensions, left) }
 }
-
-/// Halvings that find a share to 1e-9.
-const SHARE_BISECTIONS: u32 = 30;
 
 /// p-value of a χ² variable.
 pub(crate) fn p_of_chi_square(statistic: f64, freedom: f64) -> f64 {

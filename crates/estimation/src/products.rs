@@ -151,8 +151,8 @@ impl<'p> Sums<'p> {
         information
     }
 
-    /// The normal equation with the free heading eliminated, and the heading's response. What is not carried is
-    /// zero.
+    /// The normal equation with the free heading eliminated, and the heading's response. What is not carried
+    /// is zero.
     pub(crate) fn eliminated(&self, run: (usize, usize)) -> (NormalEquations, Option<HeadingResponse>) {
         let layout = self.products.layout;
         let carried = layout.columns();

@@ -68,6 +68,10 @@ pub(crate) const MAX_CANDIDATES_TRIED: usize = 3;
 /// Budgeted: one in four logs without an effect has one.
 pub(crate) const REFITTED_LEVEL: f64 = 0.01;
 
+/// Number. Halvings that find which share a regression explains.
+/// Derived: 2⁻³⁰ is 1e-9.
+pub(crate) const SHARE_BISECTIONS: u32 = 30;
+
 /// Number. So many of these are refitted at the most.
 /// Budgeted: a refit costs as much as a scan, and causes that are alike have the same ratio.
 pub(crate) const MAX_REFITTED_BY_SCORE: usize = 3;
