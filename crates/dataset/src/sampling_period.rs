@@ -21,6 +21,12 @@ const LINE_ROWS: usize = 250;
 const ROUNDS: usize = 5;
 /// Share of the beat by which gaps that are whole numbers of it depart at the most.
 const MAX_WHOLE_GAP_ERROR: f64 = 0.05;
+/// The same where rows came by themselves between them, and stamps are exact: far below what stamps that were
+/// restored are off by.
+const MAX_EXACT_GAP_ERROR: f64 = 1e-3;
+/// Share of the rows that came by themselves beside an exact beat at the most: a quarter of what the beat is
+/// told from.
+const MAX_SHARE_BY_THEMSELVES: f64 = 0.25;
 /// Spans of so many rows whose phases say the beat, within these shares of what was known before, and in how
 /// many steps: a fifth of the rows may be lost at first, or have come by themselves; then three times what a
 /// span before leaves open.
@@ -69,6 +75,15 @@ impl SamplingPeriod {
         }
         let gap_s = median(t_s.windows(2).map(|pair| pair[1] - pair[0]).collect())?;
         // The middle gap is exact where stamps are.
+        if let Some(numbers) = numbers_beside_rows_of_their_own(t_s, gap_s) {
+            return Some(Self {
+                period_s: gap_s,
+                late_s: vec![0.0; numbers.len()],
+                numbers,
+                is_bunched: false,
+                off_s: 0.0,
+            });
+        }
         let Numbered { period_s, numbers, .. } = match Numbered::by(t_s, gap_s) {
             Some(exact) if exact.cost == f64::NEG_INFINITY => exact,
             of_gap => {
@@ -201,6 +216,40 @@ fn whole_gaps(t_s: &[f64], period_s: f64) -> Option<Vec<i64>> {
         numbers.push(last);
     }
     Some(numbers)
+}
+
+/// Numbers where every row is exactly of the beat but for some that came by themselves, as a log has them
+/// that writes a row where a motion ends, too; behind one of these the beat may begin anew.
+fn numbers_beside_rows_of_their_own(t_s: &[f64], period_s: f64) -> Option<Vec<i64>> {
+    if period_s <= 0.0 {
+        return None;
+    }
+    let whole = |gap: f64| {
+        let ticks = gap.round();
+        (ticks >= 1.0 && (gap - ticks).abs() <= MAX_EXACT_GAP_ERROR * ticks.sqrt()).then_some(ticks as i64)
+    };
+    let mut numbers = vec![0];
+    // The last row of the beat, and its number.
+    let (mut beat_s, mut number, mut by_themselves) = (t_s[0], 0, 0);
+    for pair in t_s.windows(2) {
+        let since_beat = (pair[1] - beat_s) / period_s;
+        let last = numbers[numbers.len() - 1];
+        if let Some(ticks) = whole(since_beat) {
+            (beat_s, number) = (pair[1], number + ticks);
+            numbers.push(number);
+        } else if let Some(ticks) = whole((pair[1] - pair[0]) / period_s) {
+            (beat_s, number) = (pair[1], last + ticks);
+            numbers.push(number);
+        } else {
+            // Of the tick before it, or of that which it is next to.
+            let next = (since_beat - since_beat.round()).abs() <= MAX_EXACT_GAP_ERROR.sqrt();
+            let ticks = if next { since_beat.round() } else { since_beat.floor() };
+            numbers.push((number + ticks as i64).max(last));
+            by_themselves += 1;
+        }
+    }
+    let is_some = by_themselves > 0 && by_themselves as f64 <= MAX_SHARE_BY_THEMSELVES * t_s.len() as f64;
+    is_some.then_some(numbers)
 }
 
 /// Whether no neighbour has a row's number; numbers do not fall.
@@ -358,6 +407,32 @@ mod tests {
         let found = SamplingPeriod::of(&t_s).expect("a beat");
         // Rejects a row more on the beat, after which all are early by one.
         assert_eq!((found.numbers[79], found.numbers[81], found.numbers[200]), (79, 80, 199));
+    }
+
+    /// A log that writes a row where a motion ends, too: most rows are exactly on the beat.
+    #[test]
+    fn regress_rows_between_exact_ticks_make_the_beat_no_shorter_and_lose_no_row() {
+        // A row 0.02 of the beat after the third, from which the beat begins anew; one between each nine ticks;
+        // and two ticks that are missing.
+        let anew_s = |tick: u32| 0.2 * f64::from(tick) + if tick > 3 { 0.004 } else { 0.0 };
+        let (mut t_s, mut numbers) = (Vec::new(), Vec::new());
+        for tick in (0..200_u32).filter(|tick| *tick != 100 && *tick != 101) {
+            t_s.push(anew_s(tick));
+            numbers.push(i64::from(tick));
+            if tick == 3 || tick % 9 == 8 {
+                t_s.push(anew_s(tick) + if tick == 3 { 0.004 } else { 0.6 * 0.2 });
+                numbers.push(i64::from(tick));
+            }
+        }
+        let found = SamplingPeriod::of(&t_s).expect("a beat");
+        assert_eq!(found.numbers, numbers);
+        assert!((found.period_s - 0.2).abs() < 1e-12 && found.is_certain(), "{}", found.period_s);
+        assert_eq!(found.late_s, vec![0.0; t_s.len()]);
+        // Stamps that jitter are not taken for rows between ticks.
+        let mut draws = Draws(3);
+        let jittering: Vec<f64> = t_s.iter().map(|t_s| t_s + 2e-3 * draws.normal()).collect();
+        let found = SamplingPeriod::of(&jittering).expect("a beat");
+        assert!(found.late_s.iter().any(|late_s| late_s.abs() > 1e-3));
     }
 
     #[test]

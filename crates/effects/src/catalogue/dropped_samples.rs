@@ -97,7 +97,10 @@ const GAP_RATIO: f64 = 1.5;
 const MIN_MISSED_COUNTS: f64 = 6.0;
 /// Rows to either side of a gap that say how fast the wheels turned: their rounding is a third of a row's.
 const ROWS_AROUND: usize = 3;
-/// With so many gaps that lost counts, and as few that did not, the log itself shows the fault.
+/// Where so many times as many gaps lost counts as did not, all did: those that did not are mistakes of single
+/// ones.
+const ALL_LOST_RATIO: usize = 4;
+/// With so many gaps that lost counts, the log itself shows the fault.
 const MIN_VISIBLE_FAULTS: usize = 3;
 /// Share of the pairs of successive measurements that gaps may spoil for the rest to be enough.
 const MAX_SPOILED_PAIRS: f64 = 0.5;
@@ -112,6 +115,8 @@ struct Missing {
     kept: usize,
     /// The numbers of the rows are not certain.
     uncertain: bool,
+    /// Rows wait for each other: a gap may be one that was held up.
+    is_bunched: bool,
 }
 
 /// Rows from each row to the next: more than one where rows are missing between them. By the beat, as stamps
@@ -146,49 +151,78 @@ fn spoiled_pairs(runs: &[Run]) -> f64 {
     if pairs > 0.0 { spoiled / pairs } else { 1.0 }
 }
 
-/// Carries the counts of every gap on, and says what was missing.
-///
-/// Over a gap the wheels turn at the speed of the rows before and after it together, exactly so where the
-/// acceleration is constant; the row after it shows less.
-fn fill(run: &mut Run) -> Missing {
+/// A gap of some rows.
+#[derive(Debug, Clone, Copy)]
+struct Gap {
+    /// The row before it.
+    row: usize,
+    /// Rows that are missing.
+    missing: f64,
+    /// Counts that it lacks of those due at the speed of the rows before and after it together: exactly so
+    /// where the acceleration is constant; the row after it shows less.
+    lacks: Wheels<f64>,
+    /// Whether they were lost; `None` where it is too short for its counts to tell.
+    is_lost: Option<bool>,
+}
+
+/// The gaps of a run over which its wheels turned, and what they say of missing rows.
+fn gaps(run: &Run) -> (Vec<Gap>, Missing) {
     let mut missing = Missing::default();
-    let Odometry { t_s, wheels: WheelLog::Ticks(ticks), .. } = &mut run.odometry else { return missing };
-    let Some((rows, uncertain)) = rows_after(t_s) else { return missing };
+    let Odometry { t_s, wheels: WheelLog::Ticks(ticks), .. } = &run.odometry else { return (Vec::new(), missing) };
+    let Some((rows, uncertain)) = rows_after(t_s) else { return (Vec::new(), missing) };
     missing.uncertain = uncertain;
+    missing.is_bunched = t_s.sampling_period().is_some_and(|period| period.is_bunched);
     let shown =
         ticks.as_ref().map(|column| column.windows(2).map(|pair| (pair[1] - pair[0]) as f64).collect::<Vec<_>>());
     let is_row = |k: &usize| rows[*k] == 1.0;
-    let mut lost = Wheels::both(0.0);
-    let mut spans = Vec::new();
-    for (k, &of_gap) in rows.iter().enumerate() {
-        if of_gap > 1.0 {
-            let before: Vec<usize> = (0..k).rev().filter(is_row).take(ROWS_AROUND).collect();
-            let after: Vec<usize> = (k + 1..rows.len()).filter(is_row).take(ROWS_AROUND).collect();
-            let of_each = match before.len().min(after.len()) {
-                0 => ROWS_AROUND,
-                of_each => of_each,
-            };
-            let around: Vec<usize> = before.into_iter().take(of_each).chain(after.into_iter().take(of_each)).collect();
-            let time_s: f64 = around.iter().map(|near| t_s[near + 1] - t_s[*near]).sum();
-            let counts = Wheels::from_sides(|side| around.iter().map(|near| shown[side][*near]).sum::<f64>());
-            // Counts of a row around it, and of the gap at their speed.
-            let of_row = counts.map(|counts| counts / (around.len() as f64).max(1.0));
-            let due = counts.map(|counts| if time_s > 0.0 { counts / time_s * (t_s[k + 1] - t_s[k]) } else { 0.0 });
-            let [row_of_both, shown_of_both] =
-                [of_row.left.abs() + of_row.right.abs(), shown.left[k].abs() + shown.right[k].abs()];
-            // Half of the missing rows' counts lie between what a single row shows and what all of them do.
-            let is_lost = shown_of_both < 0.5 * (1.0 + of_gap) * row_of_both;
-            if (of_gap - 1.0) * row_of_both < MIN_MISSED_COUNTS {
-                // Neither tells.
-            } else if is_lost {
-                for side in Side::BOTH {
-                    lost[side] += due[side] - shown[side][k];
-                }
-                spans.push(UnknownMotion { from_s: t_s[k], to_s: t_s[k + 1] });
-                missing.lost += 1;
-                missing.rows += of_gap.round() - 1.0;
-            } else {
-                missing.kept += 1;
+    let mut found = Vec::new();
+    for (k, &of_gap) in rows.iter().enumerate().filter(|(_, of_gap)| **of_gap > 1.0) {
+        let before: Vec<usize> = (0..k).rev().filter(is_row).take(ROWS_AROUND).collect();
+        let after: Vec<usize> = (k + 1..rows.len()).filter(is_row).take(ROWS_AROUND).collect();
+        let of_each = match before.len().min(after.len()) {
+            0 => ROWS_AROUND,
+            of_each => of_each,
+        };
+        let around: Vec<usize> = before.into_iter().take(of_each).chain(after.into_iter().take(of_each)).collect();
+        let time_s: f64 = around.iter().map(|near| t_s[near + 1] - t_s[*near]).sum();
+        let counts = Wheels::from_sides(|side| around.iter().map(|near| shown[side][*near]).sum::<f64>());
+        // Counts of a row around it, and of the gap at their speed.
+        let of_row = counts.map(|counts| counts / (around.len() as f64).max(1.0));
+        let due = counts.map(|counts| if time_s > 0.0 { counts / time_s * (t_s[k + 1] - t_s[k]) } else { 0.0 });
+        let [row_of_both, shown_of_both] =
+            [of_row.left.abs() + of_row.right.abs(), shown.left[k].abs() + shown.right[k].abs()];
+        if row_of_both + shown_of_both == 0.0 {
+            continue;
+        }
+        // Half of the missing rows' counts lie between what a single row shows and what all of them do.
+        let is_lost = ((of_gap - 1.0) * row_of_both >= MIN_MISSED_COUNTS)
+            .then_some(shown_of_both < 0.5 * (1.0 + of_gap) * row_of_both);
+        match is_lost {
+            Some(true) => missing.lost += 1,
+            Some(false) => missing.kept += 1,
+            None => {}
+        }
+        let lacks = Wheels::from_sides(|side| due[side] - shown[side][k]);
+        found.push(Gap { row: k, missing: of_gap.round() - 1.0, lacks, is_lost });
+    }
+    (found, missing)
+}
+
+/// Carries the counts of gaps on that lost them, and says how many rows were missing. Where all did, so did
+/// those that are too short to tell: at low speeds none tells, and counts that stayed lost there alone would
+/// be an effect of starts and stops.
+fn fill(run: &mut Run, gaps: &[Gap], all_lost: bool) -> f64 {
+    let WheelLog::Ticks(ticks) = &mut run.odometry.wheels else { return 0.0 };
+    let (mut lost, mut spans, mut missing) = (Wheels::both(0.0), Vec::new(), 0.0);
+    let mut next = gaps.iter().peekable();
+    for k in 0..ticks.left.len().saturating_sub(1) {
+        if let Some(gap) = next.next_if(|gap| gap.row == k) {
+            if gap.is_lost.unwrap_or(all_lost) {
+                lost = lost.zip_with(gap.lacks, |lost, lacks| lost + lacks);
+                missing += gap.missing;
+            }
+            if all_lost || gap.is_lost == Some(true) {
+                spans.push(UnknownMotion { from_s: run.odometry.t_s[k], to_s: run.odometry.t_s[k + 1] });
             }
         }
         for side in Side::BOTH {
@@ -200,19 +234,25 @@ fn fill(run: &mut Run) -> Missing {
 }
 
 fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
-    let mut records = dataset.clone();
-    let (mut missing, mut rows) = (Missing::default(), 0.0);
-    for run in &mut records.runs {
-        let of_run = fill(run);
-        missing.rows += of_run.rows;
+    let of_runs: Vec<(Vec<Gap>, Missing)> = dataset.runs.iter().map(gaps).collect();
+    let mut missing = Missing::default();
+    for (_, of_run) in &of_runs {
         missing.lost += of_run.lost;
         missing.kept += of_run.kept;
         missing.uncertain |= of_run.uncertain;
-        let written = run.odometry.t_s.len() as f64;
-        rows += written;
+        missing.is_bunched |= of_run.is_bunched;
     }
     if missing.lost == 0 {
         return Vec::new();
+    }
+    let mut records = dataset.clone();
+    // Where numbers of rows are wrong, a gap that does not tell may be none.
+    let is_plain = missing.lost > ALL_LOST_RATIO * missing.kept && !missing.uncertain;
+    let all_lost = is_plain && !missing.is_bunched;
+    let mut rows = 0.0;
+    for (run, (gaps, _)) in records.runs.iter_mut().zip(&of_runs) {
+        missing.rows += fill(run, gaps, all_lost);
+        rows += run.odometry.t_s.len() as f64;
     }
     if spoiled_pairs(&records.runs) > MAX_SPOILED_PAIRS {
         for (run, recorded) in records.runs.iter_mut().zip(&dataset.runs) {
@@ -222,7 +262,7 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
     vec![RecordCorrection {
         values: vec![("probability", missing.rows / (missing.rows + rows))],
         sentence: format!("{} rows are missing, and their counts with them", missing.rows),
-        visible_in_log: missing.lost >= MIN_VISIBLE_FAULTS && missing.lost > missing.kept && !missing.uncertain,
+        visible_in_log: missing.lost >= MIN_VISIBLE_FAULTS && is_plain,
         mistakes: 1,
         records,
     }]
@@ -260,8 +300,9 @@ mod tests {
     fn counts_of_lost_rows_are_carried_on_through_ramps_and_jitter() {
         let (record, whole) = odometry(&[9, 30, 31, 50], true);
         let mut run = Run { odometry: record, ..Run::default() };
-        let missing = fill(&mut run);
-        assert_eq!((missing.rows, missing.lost, missing.kept), (4.0, 3, 0));
+        let (gaps, missing) = gaps(&run);
+        assert_eq!((missing.lost, missing.kept), (3, 0));
+        assert_eq!(fill(&mut run, &gaps, true), 4.0);
         let spans = run.unknown_motion.len();
         assert!(spans == 3 && run.is_motion_unknown(0.4, 0.5) && !run.is_motion_unknown(0.6, 1.0), "{spans}");
         let WheelLog::Ticks(ticks) = &run.odometry.wheels else { panic!("counts") };
@@ -276,7 +317,35 @@ mod tests {
     fn a_gap_over_which_the_counters_went_on_is_left_alone() {
         let (record, whole) = odometry(&[9, 30, 31, 50], false);
         let mut run = Run { odometry: record, ..Run::default() };
-        assert_eq!(fill(&mut run).lost, 0);
+        let (gaps, missing) = gaps(&run);
+        assert_eq!((missing.lost, missing.kept), (0, 3));
+        fill(&mut run, &gaps, false);
         assert_eq!(run.odometry.wheels, WheelLog::Ticks(Wheels { left: whole.clone(), right: whole }));
+    }
+
+    /// One count a row, of which no gap tells: what it lost is what those lost that tell.
+    #[test]
+    fn regress_a_gap_at_low_speed_is_as_those_are_that_tell() {
+        let counted = |row: usize| if row < 40 { row as i64 } else { 40 + 20 * (row as i64 - 40) };
+        let (mut t_s, mut column, mut whole, mut lost) = (Vec::new(), Vec::new(), Vec::new(), 0);
+        for row in 0..80 {
+            if row == 20 || row == 60 {
+                lost += counted(row) - counted(row - 1);
+                continue;
+            }
+            t_s.push(0.05 * row as f64);
+            column.push(counted(row) - lost);
+            whole.push(counted(row));
+        }
+        let wheels = WheelLog::Ticks(Wheels { left: column.clone(), right: column });
+        let run = Run { odometry: Odometry { t_s: t_s.into(), wheels, ..Odometry::default() }, ..Run::default() };
+        let (gaps, missing) = gaps(&run);
+        assert_eq!((gaps.len(), missing.lost, missing.kept), (2, 1, 0));
+        let (mut as_most, mut alone) = (run.clone(), run.clone());
+        assert_eq!((fill(&mut as_most, &gaps, true), fill(&mut alone, &gaps, false)), (2.0, 1.0));
+        assert_eq!(as_most.odometry.wheels, WheelLog::Ticks(Wheels { left: whole.clone(), right: whole.clone() }));
+        assert!(as_most.is_motion_unknown(0.96, 1.04) && !alone.is_motion_unknown(0.96, 1.04));
+        let WheelLog::Ticks(ticks) = &alone.odometry.wheels else { panic!("counts") };
+        assert_eq!(whole.last().copied().zip(ticks.left.last().copied()).map(|(of, is)| of - is), Some(1));
     }
 }
