@@ -412,8 +412,8 @@ mod tests {
     /// A log that writes a row where a motion ends, too: most rows are exactly on the beat.
     #[test]
     fn regress_rows_between_exact_ticks_make_the_beat_no_shorter_and_lose_no_row() {
-        // A row 0.02 of the beat after the third, from which the beat begins anew; one between each nine ticks;
-        // and two ticks that are missing.
+        // A row 0.02 of the beat after the third, from which the beat begins anew; one between each nine
+        // ticks; and two ticks that are missing.
         let anew_s = |tick: u32| 0.2 * f64::from(tick) + if tick > 3 { 0.004 } else { 0.0 };
         let (mut t_s, mut numbers) = (Vec::new(), Vec::new());
         for tick in (0..200_u32).filter(|tick| *tick != 100 && *tick != 101) {
