@@ -97,8 +97,7 @@ const GAP_RATIO: f64 = 1.5;
 const MIN_MISSED_COUNTS: f64 = 6.0;
 /// Rows to either side of a gap that say how fast the wheels turned: their rounding is a third of a row's.
 const ROWS_AROUND: usize = 3;
-/// Where so many times as many gaps lost counts as did not, all did: those that did not are mistakes of single
-/// ones.
+/// Where so many times as many gaps lost counts as did not, all did: those that did not are mistakes.
 const ALL_LOST_RATIO: usize = 4;
 /// With so many gaps that lost counts, the log itself shows the fault.
 const MIN_VISIBLE_FAULTS: usize = 3;
