@@ -132,7 +132,7 @@ impl TrueNoise {
 /// Half of the χ² of noise-free runs under a model with terms: what the model costs of the log score, on
 /// average over the measurements' errors.
 pub(crate) fn misfit(datasets: &[Dataset], model: &Model, noise: TrueNoise, terms: &mut [Box<dyn ModelTerm>]) -> f64 {
-    let runs = NoiseFree::of(datasets, model, noise, terms);
+    let runs = NoiseFree::of(datasets).with_best_headings(model, noise, terms);
     runs.measurement(model, noise, terms).map_or(0.0, |measured| 0.5 * measured.total.chi_square)
 }
 
@@ -190,8 +190,9 @@ pub(crate) fn misfit_of_form(
     let columns: Vec<Column> =
         Column::GEOMETRY.into_iter().chain((0..model.term_values.len()).map(Column::Term)).collect();
     let (mut model, mut least) = (model.clone(), f64::INFINITY);
+    let mut runs = NoiseFree::of(datasets);
     for _ in 0..=GAUSS_NEWTON_STEPS {
-        let runs = NoiseFree::of(datasets, &model, noise, terms);
+        runs = runs.with_best_headings(&model, noise, terms);
         let Some(measured) = runs.measurement(&model, noise, terms) else { return least };
         least = least.min(0.5 * measured.total.chi_square);
         let Some((step, _)) = measured.total.of(&columns).solve() else { return least };
@@ -221,22 +222,26 @@ const HEADING_PASSES: usize = 4;
 const HEADING_TOLERANCE_RAD: f64 = 1e-9;
 
 impl<'d> NoiseFree<'d> {
-    /// Runs with the headings that fit best under a model.
-    fn of(datasets: &'d [Dataset], model: &Model, noise: TrueNoise, terms: &mut [Box<dyn ModelTerm>]) -> Self {
+    /// Runs with headings of zero where none is measured.
+    fn of(datasets: &'d [Dataset]) -> Self {
         let records = records(datasets);
-        let mut runs = Self { headings: vec![0.0; records.segments.len()], records };
-        if !runs.records.segments.iter().any(Segment::has_free_heading) {
-            return runs;
+        Self { headings: vec![0.0; records.segments.len()], records }
+    }
+
+    /// The same with the headings that fit best under a model, from those that they have on.
+    fn with_best_headings(mut self, model: &Model, noise: TrueNoise, terms: &mut [Box<dyn ModelTerm>]) -> Self {
+        if !self.records.segments.iter().any(Segment::has_free_heading) {
+            return self;
         }
         for _ in 0..HEADING_PASSES {
-            let pass = runs.pass(model, noise, terms);
+            let pass = self.pass(model, noise, terms);
             let steps: Vec<(usize, f64)> = pass.heading_steps().collect();
-            steps.iter().for_each(|(segment, step_rad)| runs.headings[*segment] += step_rad);
+            steps.iter().for_each(|(segment, step_rad)| self.headings[*segment] += step_rad);
             if steps.iter().all(|(_, step_rad)| step_rad.abs() <= HEADING_TOLERANCE_RAD) {
                 break;
             }
         }
-        runs
+        self
     }
 
     /// Other runs with the headings of these.
@@ -331,7 +336,7 @@ impl Detectability {
         let columns: Vec<Column> = Column::GEOMETRY.into_iter().chain(has_gyro.then_some(Column::GyroScale)).collect();
         let free: Vec<usize> = columns.iter().map(|column| column.index()).collect();
         let mut best = Model::of(truth, 0);
-        let without = NoiseFree::of(without, &best, noise, &mut []);
+        let without = NoiseFree::of(without).with_best_headings(&best, noise, &mut []);
         let with = without.beside(datasets)?;
         if has_gyro {
             // Its scale and how wrong it is are no signature of the effect's.

@@ -201,18 +201,19 @@ impl Numbered {
     }
 }
 
+/// The ticks of a gap that is a whole number of beats but for so much of one: a clock that drifts by less
+/// makes a long pause no whole number.
+fn whole_ticks(gap: f64, max_error: f64) -> Option<i64> {
+    let ticks = gap.round();
+    (ticks >= 1.0 && (gap - ticks).abs() <= max_error * ticks.sqrt()).then_some(ticks as i64)
+}
+
 /// Numbers where every gap is a whole number of beats.
 fn whole_gaps(t_s: &[f64], period_s: f64) -> Option<Vec<i64>> {
     let mut numbers = vec![0];
     let mut last = 0;
     for pair in t_s.windows(2) {
-        let gap = (pair[1] - pair[0]) / period_s;
-        let ticks = gap.round();
-        // A clock that drifts by less makes a long pause no whole number.
-        if ticks < 1.0 || (gap - ticks).abs() > MAX_WHOLE_GAP_ERROR * ticks.sqrt() {
-            return None;
-        }
-        last += ticks as i64;
+        last += whole_ticks((pair[1] - pair[0]) / period_s, MAX_WHOLE_GAP_ERROR)?;
         numbers.push(last);
     }
     Some(numbers)
@@ -224,26 +225,23 @@ fn numbers_beside_rows_of_their_own(t_s: &[f64], period_s: f64) -> Option<Vec<i6
     if period_s <= 0.0 {
         return None;
     }
-    let whole = |gap: f64| {
-        let ticks = gap.round();
-        (ticks >= 1.0 && (gap - ticks).abs() <= MAX_EXACT_GAP_ERROR * ticks.sqrt()).then_some(ticks as i64)
-    };
+    let whole = |gap: f64| whole_ticks(gap, MAX_EXACT_GAP_ERROR);
     let mut numbers = vec![0];
     // The last row of the beat, and its number.
-    let (mut beat_s, mut number, mut by_themselves) = (t_s[0], 0, 0);
+    let (mut last_due_s, mut number, mut by_themselves) = (t_s[0], 0, 0);
     for pair in t_s.windows(2) {
-        let since_beat = (pair[1] - beat_s) / period_s;
+        let since_due = (pair[1] - last_due_s) / period_s;
         let last = numbers[numbers.len() - 1];
-        if let Some(ticks) = whole(since_beat) {
-            (beat_s, number) = (pair[1], number + ticks);
+        if let Some(ticks) = whole(since_due) {
+            (last_due_s, number) = (pair[1], number + ticks);
             numbers.push(number);
         } else if let Some(ticks) = whole((pair[1] - pair[0]) / period_s) {
-            (beat_s, number) = (pair[1], last + ticks);
+            (last_due_s, number) = (pair[1], last + ticks);
             numbers.push(number);
         } else {
             // Of the tick before it, or of that which it is next to.
-            let next = (since_beat - since_beat.round()).abs() <= MAX_EXACT_GAP_ERROR.sqrt();
-            let ticks = if next { since_beat.round() } else { since_beat.floor() };
+            let next = (since_due - since_due.round()).abs() <= MAX_EXACT_GAP_ERROR.sqrt();
+            let ticks = if next { since_due.round() } else { since_due.floor() };
             numbers.push((number + ticks as i64).max(last));
             by_themselves += 1;
         }

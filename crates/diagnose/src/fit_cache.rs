@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use estimation::ModelFit;
 
-use crate::augmented_model::{AugmentedModel, others, without};
+use crate::augmented_model::{AugmentedModel, others, refit, without};
 use crate::candidate::Candidate;
 use crate::reliability::unresolved;
 use crate::scan::{Scored, scan};
@@ -51,6 +51,18 @@ impl<'a> FitCache<'a> {
         let fewer = self.fit(&others(model, index)).cloned().or_else(|| without(base, model, index))?;
         self.keep(&fewer);
         Some(fewer)
+    }
+
+    /// The model with other candidates, as [`refit`] makes it: one made before, or a new one, which is kept.
+    pub(crate) fn refitted(
+        &mut self,
+        base: &ModelFit<'a>,
+        from: &AugmentedModel<'a>,
+        candidates: Vec<Candidate>,
+    ) -> Option<AugmentedModel<'a>> {
+        let fit = self.fit(&candidates).cloned().or_else(|| refit(base, from, candidates))?;
+        self.keep(&fit);
+        Some(fit)
     }
 
     pub(crate) fn keep(&mut self, model: &AugmentedModel<'a>) {

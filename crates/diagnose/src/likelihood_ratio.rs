@@ -10,7 +10,7 @@
 
 use estimation::ModelFit;
 
-use crate::augmented_model::{AugmentedModel, cost, count, refit};
+use crate::augmented_model::{AugmentedModel, cost, count};
 use crate::fit_cache::FitCache;
 use crate::null_distribution::NullDistribution;
 use crate::ranking::Entry;
@@ -32,8 +32,7 @@ pub(crate) fn significant_once_refitted<'e, 'a>(
     let p_value_of = |entry: &'e Entry| {
         let mut candidates = model.candidates.clone();
         candidates.push(entry.scored.candidate.clone());
-        let refitted = known.fit(&candidates).cloned().or_else(|| refit(base, model, candidates))?;
-        known.keep(&refitted);
+        let refitted = known.refitted(base, model, candidates)?;
         Some((entry, sidak(p_value(model, &refitted, entry, level / tests)?, entry.variants.max(1))))
     };
     let tested = ranked.into_iter().filter_map(p_value_of);

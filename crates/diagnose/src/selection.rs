@@ -5,7 +5,7 @@ use std::ops::Range;
 use estimation::{ModelFit, total};
 use nalgebra::{DMatrix, DVector};
 
-use crate::augmented_model::{AugmentedModel, refit};
+use crate::augmented_model::AugmentedModel;
 use crate::candidate::Candidate;
 use crate::fit_cache::FitCache;
 use crate::gain::gain;
@@ -97,9 +97,7 @@ fn without_what_cancels<'a>(
             let is_chosen = |(index, _): &(usize, &Candidate)| chosen >> index & 1 == 1;
             let candidates: Vec<Candidate> =
                 model.candidates.iter().enumerate().filter(is_chosen).map(|(_, candidate)| candidate.clone()).collect();
-            let fit = known.fit(&candidates).cloned().or_else(|| refit(base, &model, candidates))?;
-            known.keep(&fit);
-            Some(fit)
+            known.refitted(base, &model, candidates)
         })
         .collect();
     let all: Vec<&'static str> = model.candidates.iter().map(Candidate::id).collect();

@@ -47,9 +47,8 @@ pub(crate) fn p_of_ratio(score: f64, ratio: f64, dimensions: usize) -> f64 {
         let share = 0.5 * (low + high);
         if quotient(share) * ratio > score { low = share } else { high = share }
     }
-    let share = 0.5 * (low + high);
-    let left = score / share - dimensions as f64;
-    if left < 1.0 { 1.0 } else { p_of_statistic(left * share / (1.0 - share), dimensions, left) }
+    let values = score / (0.5 * (low + high));
+    p_of_score(score, dimensions, values, values)
 }
 
 /// p-value of a χ² variable.

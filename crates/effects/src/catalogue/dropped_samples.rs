@@ -104,10 +104,9 @@ const MIN_VISIBLE_FAULTS: usize = 3;
 /// Share of the pairs of successive measurements that gaps may spoil for the rest to be enough.
 const MAX_SPOILED_PAIRS: f64 = 0.5;
 
-/// What was missing of some runs.
+/// What the gaps of some runs say.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct Missing {
-    rows: f64,
     /// Gaps over which a moving robot lost counts.
     lost: usize,
     /// Gaps over which it did not.
@@ -248,9 +247,9 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
     // Where numbers of rows are wrong, a gap that does not tell may be none.
     let is_plain = missing.lost > ALL_LOST_RATIO * missing.kept && !missing.uncertain;
     let all_lost = is_plain && !missing.is_bunched;
-    let mut rows = 0.0;
+    let (mut missing_rows, mut rows) = (0.0, 0.0);
     for (run, (gaps, _)) in records.runs.iter_mut().zip(&of_runs) {
-        missing.rows += fill(run, gaps, all_lost);
+        missing_rows += fill(run, gaps, all_lost);
         rows += run.odometry.t_s.len() as f64;
     }
     if spoiled_pairs(&records.runs) > MAX_SPOILED_PAIRS {
@@ -259,8 +258,8 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
         }
     }
     vec![RecordCorrection {
-        values: vec![("probability", missing.rows / (missing.rows + rows))],
-        sentence: format!("{} rows are missing, and their counts with them", missing.rows),
+        values: vec![("probability", missing_rows / (missing_rows + rows))],
+        sentence: format!("{missing_rows} rows are missing, and their counts with them"),
         visible_in_log: missing.lost >= MIN_VISIBLE_FAULTS && is_plain,
         mistakes: 1,
         records,
