@@ -101,6 +101,9 @@ const ROWS_AROUND: usize = 3;
 const ALL_LOST_RATIO: usize = 4;
 /// With so many gaps that lost counts, the log itself shows the fault.
 const MIN_VISIBLE_FAULTS: usize = 3;
+/// Share of the gaps that are taken for such that lost their counts and did not, at the most: three times what
+/// logs show whose counters go on.
+const MAX_MISJUDGED_SHARE: f64 = 0.1;
 /// Share of the pairs of successive measurements that gaps may spoil for the rest to be enough.
 const MAX_SPOILED_PAIRS: f64 = 0.5;
 
@@ -115,6 +118,42 @@ struct Missing {
     uncertain: bool,
     /// Rows wait for each other: a gap may be one that was held up.
     is_bunched: bool,
+}
+
+/// What gaps did that are too short to tell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum ShortGaps {
+    /// They lost their counts, as nearly all did that tell.
+    Lost,
+    /// They kept them; or may be no gaps at all.
+    AsTheyAre,
+    /// Some did and some did not: nothing can be compared across them.
+    Either,
+}
+
+impl Missing {
+    /// Whether more gaps lost their counts than are misjudged.
+    fn some_lost(&self) -> bool {
+        self.lost as f64 > MAX_MISJUDGED_SHARE * (self.lost + self.kept) as f64 && !self.uncertain
+    }
+
+    /// Whether the log itself shows the fault.
+    fn is_visible(&self) -> bool {
+        self.lost >= MIN_VISIBLE_FAULTS && self.some_lost()
+    }
+
+    fn short_gaps(&self) -> ShortGaps {
+        // Where numbers of rows are wrong, or a row was held up, a gap that does not tell may be none.
+        if self.uncertain || self.is_bunched {
+            ShortGaps::AsTheyAre
+        } else if self.lost > ALL_LOST_RATIO * self.kept {
+            ShortGaps::Lost
+        } else if self.some_lost() {
+            ShortGaps::Either
+        } else {
+            ShortGaps::AsTheyAre
+        }
+    }
 }
 
 /// Rows from each row to the next: more than one where rows are missing between them. By the beat, as stamps
@@ -163,6 +202,28 @@ struct Gap {
     is_lost: Option<bool>,
 }
 
+/// Whether the counts of a gap of so many rows were lost, by what both wheels show over it and what each shows
+/// in a row before and after it; `None` where that does not tell.
+fn is_lost(rows: f64, shown: f64, before: Wheels<f64>, after: Wheels<f64>) -> Option<bool> {
+    // Over a gap in which a wheel started, stopped or turned round, it may have stood.
+    let (mut least, mut most) = (0.0, 0.0);
+    for side in Side::BOTH {
+        let [before, after] = [before[side], after[side]];
+        most += before.abs().max(after.abs());
+        least += if before * after > 0.0 { before.abs().min(after.abs()) } else { 0.0 };
+    }
+    if (rows - 1.0) * least < MIN_MISSED_COUNTS {
+        return None;
+    }
+    // Half of the missing rows' counts lie between what a single row shows and what all of them do.
+    let halfway = |of_row: f64| 0.5 * (1.0 + rows) * of_row;
+    match shown {
+        shown if shown < halfway(least) => Some(true),
+        shown if shown >= halfway(most) => Some(false),
+        _ => None,
+    }
+}
+
 /// The gaps of a run over which its wheels turned, and what they say of missing rows.
 fn gaps(run: &Run) -> (Vec<Gap>, Missing) {
     let mut missing = Missing::default();
@@ -181,20 +242,24 @@ fn gaps(run: &Run) -> (Vec<Gap>, Missing) {
             0 => ROWS_AROUND,
             of_each => of_each,
         };
-        let around: Vec<usize> = before.into_iter().take(of_each).chain(after.into_iter().take(of_each)).collect();
+        let sides = [&before[..of_each.min(before.len())], &after[..of_each.min(after.len())]];
+        let around: Vec<usize> = sides.concat();
         let time_s: f64 = around.iter().map(|near| t_s[near + 1] - t_s[*near]).sum();
-        let counts = Wheels::from_sides(|side| around.iter().map(|near| shown[side][*near]).sum::<f64>());
-        // Counts of a row around it, and of the gap at their speed.
-        let of_row = counts.map(|counts| counts / (around.len() as f64).max(1.0));
-        let due = counts.map(|counts| if time_s > 0.0 { counts / time_s * (t_s[k + 1] - t_s[k]) } else { 0.0 });
-        let [row_of_both, shown_of_both] =
-            [of_row.left.abs() + of_row.right.abs(), shown.left[k].abs() + shown.right[k].abs()];
-        if row_of_both + shown_of_both == 0.0 {
+        let counts_of = |rows: &[usize]| {
+            Wheels::from_sides(|side| rows.iter().map(|near| shown[side][*near]).sum::<f64>())
+        };
+        // Counts of the gap at the speed around it, and of a row to either side of it.
+        let due = counts_of(&around).map(|counts| match time_s > 0.0 {
+            true => counts / time_s * (t_s[k + 1] - t_s[k]),
+            false => 0.0,
+        });
+        let of_row = |rows: &[usize]| counts_of(rows).map(|counts| counts / (rows.len() as f64).max(1.0));
+        let [row_before, row_after] = sides.map(of_row);
+        let shown_of_both = shown.left[k].abs() + shown.right[k].abs();
+        if row_before == Wheels::both(0.0) && row_after == Wheels::both(0.0) && shown_of_both == 0.0 {
             continue;
         }
-        // Half of the missing rows' counts lie between what a single row shows and what all of them do.
-        let is_lost = ((of_gap - 1.0) * row_of_both >= MIN_MISSED_COUNTS)
-            .then_some(shown_of_both < 0.5 * (1.0 + of_gap) * row_of_both);
+        let is_lost = is_lost(of_gap, shown_of_both, row_before, row_after);
         match is_lost {
             Some(true) => missing.lost += 1,
             Some(false) => missing.kept += 1,
@@ -206,20 +271,19 @@ fn gaps(run: &Run) -> (Vec<Gap>, Missing) {
     (found, missing)
 }
 
-/// Carries the counts of gaps on that lost them, and says how many rows were missing. Where all did, so did
-/// those that are too short to tell: at low speeds none tells, and counts that stayed lost there alone would
-/// be an effect of starts and stops.
-fn fill(run: &mut Run, gaps: &[Gap], all_lost: bool) -> f64 {
+/// Carries the counts of gaps on that lost them, and says how many rows were missing. At low speeds no gap
+/// tells, and counts that stayed lost there alone would be an effect of starts and stops.
+fn fill(run: &mut Run, gaps: &[Gap], short: ShortGaps) -> f64 {
     let WheelLog::Ticks(ticks) = &mut run.odometry.wheels else { return 0.0 };
     let (mut lost, mut spans, mut missing) = (Wheels::both(0.0), Vec::new(), 0.0);
     let mut next = gaps.iter().peekable();
     for k in 0..ticks.left.len().saturating_sub(1) {
         if let Some(gap) = next.next_if(|gap| gap.row == k) {
-            if gap.is_lost.unwrap_or(all_lost) {
+            if gap.is_lost.unwrap_or(short == ShortGaps::Lost) {
                 lost = lost.zip_with(gap.lacks, |lost, lacks| lost + lacks);
                 missing += gap.missing;
             }
-            if all_lost || gap.is_lost == Some(true) {
+            if short == ShortGaps::Lost || gap.is_lost.unwrap_or(short != ShortGaps::AsTheyAre) {
                 spans.push(UnknownMotion { from_s: run.odometry.t_s[k], to_s: run.odometry.t_s[k + 1] });
             }
         }
@@ -244,12 +308,10 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
         return Vec::new();
     }
     let mut records = dataset.clone();
-    // Where numbers of rows are wrong, a gap that does not tell may be none.
-    let is_plain = missing.lost > ALL_LOST_RATIO * missing.kept && !missing.uncertain;
-    let all_lost = is_plain && !missing.is_bunched;
+    let short = missing.short_gaps();
     let (mut missing_rows, mut rows) = (0.0, 0.0);
     for (run, (gaps, _)) in records.runs.iter_mut().zip(&of_runs) {
-        missing_rows += fill(run, gaps, all_lost);
+        missing_rows += fill(run, gaps, short);
         rows += run.odometry.t_s.len() as f64;
     }
     if spoiled_pairs(&records.runs) > MAX_SPOILED_PAIRS {
@@ -260,7 +322,7 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
     vec![RecordCorrection {
         values: vec![("probability", missing_rows / (missing_rows + rows))],
         sentence: format!("{missing_rows} rows are missing, and their counts with them"),
-        visible_in_log: missing.lost >= MIN_VISIBLE_FAULTS && is_plain,
+        visible_in_log: missing.is_visible(),
         mistakes: 1,
         records,
     }]
@@ -300,7 +362,7 @@ mod tests {
         let mut run = Run { odometry: record, ..Run::default() };
         let (gaps, missing) = gaps(&run);
         assert_eq!((missing.lost, missing.kept), (3, 0));
-        assert_eq!(fill(&mut run, &gaps, true), 4.0);
+        assert_eq!(fill(&mut run, &gaps, ShortGaps::Lost), 4.0);
         let spans = run.unknown_motion.len();
         assert!(spans == 3 && run.is_motion_unknown(0.4, 0.5) && !run.is_motion_unknown(0.6, 1.0), "{spans}");
         let WheelLog::Ticks(ticks) = &run.odometry.wheels else { panic!("counts") };
@@ -316,8 +378,9 @@ mod tests {
         let (record, whole) = odometry(&[9, 30, 31, 50], false);
         let mut run = Run { odometry: record, ..Run::default() };
         let (gaps, missing) = gaps(&run);
-        assert_eq!((missing.lost, missing.kept), (0, 3));
-        fill(&mut run, &gaps, false);
+        // The gap on the ramp does not tell: half of what is due at its end is what its start shows.
+        assert_eq!((missing.lost, missing.kept), (0, 2));
+        fill(&mut run, &gaps, ShortGaps::AsTheyAre);
         assert_eq!(run.odometry.wheels, WheelLog::Ticks(Wheels { left: whole.clone(), right: whole }));
     }
 
@@ -340,10 +403,38 @@ mod tests {
         let (gaps, missing) = gaps(&run);
         assert_eq!((gaps.len(), missing.lost, missing.kept), (2, 1, 0));
         let (mut as_most, mut alone) = (run.clone(), run.clone());
-        assert_eq!((fill(&mut as_most, &gaps, true), fill(&mut alone, &gaps, false)), (2.0, 1.0));
+        assert_eq!((fill(&mut as_most, &gaps, ShortGaps::Lost), fill(&mut alone, &gaps, ShortGaps::AsTheyAre)), (2.0, 1.0));
         assert_eq!(as_most.odometry.wheels, WheelLog::Ticks(Wheels { left: whole.clone(), right: whole.clone() }));
         assert!(as_most.is_motion_unknown(0.96, 1.04) && !alone.is_motion_unknown(0.96, 1.04));
         let WheelLog::Ticks(ticks) = &alone.odometry.wheels else { panic!("counts") };
         assert_eq!(whole.last().copied().zip(ticks.left.last().copied()).map(|(of, is)| of - is), Some(1));
+    }
+
+    /// Where some gaps lost their counts and some did not, as where a link loses rows and a counter increments:
+    /// the log shows the fault however many did not.
+    #[test]
+    fn regress_gaps_of_both_kinds_leave_open_what_a_short_one_did() {
+        // Ten counts a row from the second second on, one before.
+        let counted = |row: usize| if row < 40 { row as i64 } else { 40 + 10 * (row as i64 - 40) };
+        let (mut t_s, mut column, mut lost) = (Vec::new(), Vec::new(), 0);
+        for row in 0..200 {
+            let is_missing = row == 20 || (row > 40 && row % 20 == 10);
+            if is_missing {
+                lost += if row % 40 == 10 { counted(row) - counted(row - 1) } else { 0 };
+                continue;
+            }
+            t_s.push(0.05 * row as f64);
+            column.push(counted(row) - lost);
+        }
+        let wheels = WheelLog::Ticks(Wheels { left: column.clone(), right: column });
+        let run = Run { odometry: Odometry { t_s: t_s.into(), wheels, ..Odometry::default() }, ..Run::default() };
+        let (gaps, missing) = gaps(&run);
+        assert_eq!((gaps.len(), missing.lost, missing.kept), (9, 4, 4));
+        assert_eq!(missing.short_gaps(), ShortGaps::Either);
+        let mut restored = run.clone();
+        assert_eq!(fill(&mut restored, &gaps, ShortGaps::Either), 4.0);
+        assert!(restored.is_motion_unknown(0.96, 1.04), "the short gap");
+        assert!(!restored.is_motion_unknown(3.46, 3.54), "one that kept its counts");
+        assert!(missing.is_visible());
     }
 }
