@@ -92,16 +92,15 @@ impl Forward for State {
 /// Where rows are too few to have a beat: an interval longer than the usual one by this factor is nearer to
 /// two of them. It may be a gap, or a pause of the log, and the counts tell.
 const GAP_RATIO: f64 = 1.5;
-/// What the rows that are missing in a gap counted, by the speed around it, counts of both wheels; with fewer
-/// the rounding of the rows around it does not let them be missed.
-const MIN_MISSED_COUNTS: f64 = 6.0;
+/// Counts that what both wheels show, over a row or a gap, may be off by as they are rounded: one of each.
+const MAX_ROUNDING: f64 = 2.0;
 /// Rows to either side of a gap that say how fast the wheels turned: their rounding is a third of a row's.
 const ROWS_AROUND: usize = 3;
 /// Where so many times as many gaps lost counts as did not, all did: those that did not are mistakes.
 const ALL_LOST_RATIO: usize = 4;
 /// With so many gaps that lost counts, the log itself shows the fault.
 const MIN_VISIBLE_FAULTS: usize = 3;
-/// Share of the gaps that are taken for such that lost their counts and did not, at the most: three times what
+/// Share of the gaps that are taken for such that lost their counts and did not, at the most: four times what
 /// logs show whose counters go on.
 const MAX_MISJUDGED_SHARE: f64 = 0.1;
 /// Share of the pairs of successive measurements that gaps may spoil for the rest to be enough.
@@ -125,33 +124,35 @@ struct Missing {
 enum ShortGaps {
     /// They lost their counts, as nearly all did that tell.
     Lost,
-    /// They kept them; or may be no gaps at all.
-    AsTheyAre,
-    /// Some did and some did not: nothing can be compared across them.
+    /// Some did and some did not: what is likelier counts, but nothing can be compared across them.
     Either,
+    /// They may be no gaps at all: what they show counts, but nothing can be compared across them.
+    Unknown,
+    /// They kept them.
+    AsTheyAre,
 }
 
 impl Missing {
     /// Whether more gaps lost their counts than are misjudged.
     fn some_lost(&self) -> bool {
-        self.lost as f64 > MAX_MISJUDGED_SHARE * (self.lost + self.kept) as f64 && !self.uncertain
+        self.lost as f64 > MAX_MISJUDGED_SHARE * (self.lost + self.kept) as f64
     }
 
     /// Whether the log itself shows the fault.
     fn is_visible(&self) -> bool {
-        self.lost >= MIN_VISIBLE_FAULTS && self.some_lost()
+        self.lost >= MIN_VISIBLE_FAULTS && self.some_lost() && !self.uncertain
     }
 
     fn short_gaps(&self) -> ShortGaps {
-        // Where numbers of rows are wrong, or a row was held up, a gap that does not tell may be none.
-        if self.uncertain || self.is_bunched {
+        if !self.some_lost() {
             ShortGaps::AsTheyAre
+        } else if self.uncertain || self.is_bunched {
+            // Where numbers of rows are wrong, or a row was held up, one that does not tell may be none.
+            ShortGaps::Unknown
         } else if self.lost > ALL_LOST_RATIO * self.kept {
             ShortGaps::Lost
-        } else if self.some_lost() {
-            ShortGaps::Either
         } else {
-            ShortGaps::AsTheyAre
+            ShortGaps::Either
         }
     }
 }
@@ -198,30 +199,49 @@ struct Gap {
     /// Counts that it lacks of those due at the speed of the rows before and after it together: exactly so
     /// where the acceleration is constant; the row after it shows less.
     lacks: Wheels<f64>,
-    /// Whether they were lost; `None` where it is too short for its counts to tell.
+    /// Whether they were lost; `None` where its counts do not tell.
     is_lost: Option<bool>,
+    /// Whether it shows less than halfway between one row's counts and those of all its rows.
+    likely_lost: bool,
+}
+
+/// A row beside a gap.
+#[derive(Debug, Clone, Copy)]
+struct Beside {
+    counts: Wheels<f64>,
+    length_s: f64,
 }
 
 /// Whether the counts of a gap of so many rows were lost, by what both wheels show over it and what each shows
-/// in a row before and after it; `None` where that does not tell.
-fn is_lost(rows: f64, shown: f64, before: Wheels<f64>, after: Wheels<f64>) -> Option<bool> {
-    // Over a gap in which a wheel started, stopped or turned round, it may have stood.
-    let (mut least, mut most) = (0.0, 0.0);
-    for side in Side::BOTH {
-        let [before, after] = [before[side], after[side]];
-        most += before.abs().max(after.abs());
-        least += if before * after > 0.0 { before.abs().min(after.abs()) } else { 0.0 };
-    }
-    if (rows - 1.0) * least < MIN_MISSED_COUNTS {
-        return None;
-    }
-    // Half of the missing rows' counts lie between what a single row shows and what all of them do.
-    let halfway = |of_row: f64| 0.5 * (1.0 + rows) * of_row;
-    match shown {
-        shown if shown < halfway(least) => Some(true),
-        shown if shown >= halfway(most) => Some(false),
-        _ => None,
-    }
+/// in the row before it and in that after it: `None` where that does not tell, and what is likelier.
+///
+/// Speeds in the gap lie between those beside it; where a wheel started, stopped or turned round, it may have
+/// stood. If counts were lost, the gap shows one row's at such a speed, if not, those of all its rows. Where
+/// stamps jitter, rows may be of the same length or as long as they say.
+fn is_lost(rows: f64, length_s: f64, shown: f64, beside: [Beside; 2]) -> (Option<bool>, bool) {
+    let row_s = length_s / rows;
+    let as_long_as_said = beside.map(|row| row.counts.map(|counts| counts * row_s / row.length_s));
+    // Counts of a row at the least and at the greatest speed.
+    let range = |[before, after]: [Wheels<f64>; 2]| {
+        Side::BOTH.into_iter().fold((0.0, 0.0), |(least, most), side| {
+            let [before, after] = [before[side], after[side]];
+            let of_side = if before * after > 0.0 { before.abs().min(after.abs()) } else { 0.0 };
+            (least + of_side, most + before.abs().max(after.abs()))
+        })
+    };
+    let (evenly, said) = (range(beside.map(|row| row.counts)), range(as_long_as_said));
+    let (least, most) = (f64::min(evenly.0, said.0), f64::max(evenly.1, said.1));
+    let [can_be_kept, can_be_lost] = [
+        shown + MAX_ROUNDING >= rows * (least - MAX_ROUNDING),
+        shown - MAX_ROUNDING <= most + MAX_ROUNDING,
+    ];
+    let likely_lost = shown < 0.25 * (1.0 + rows) * (least + most);
+    let is_lost = match (can_be_kept, can_be_lost) {
+        (true, true) => None,
+        (false, false) => Some(likely_lost),
+        (_, lost) => Some(lost),
+    };
+    (is_lost, likely_lost)
 }
 
 /// The gaps of a run over which its wheels turned, and what they say of missing rows.
@@ -253,20 +273,27 @@ fn gaps(run: &Run) -> (Vec<Gap>, Missing) {
             true => counts / time_s * (t_s[k + 1] - t_s[k]),
             false => 0.0,
         });
-        let of_row = |rows: &[usize]| counts_of(rows).map(|counts| counts / (rows.len() as f64).max(1.0));
-        let [row_before, row_after] = sides.map(of_row);
         let shown_of_both = shown.left[k].abs() + shown.right[k].abs();
-        if row_before == Wheels::both(0.0) && row_after == Wheels::both(0.0) && shown_of_both == 0.0 {
+        if due == Wheels::both(0.0) && shown_of_both == 0.0 {
             continue;
         }
-        let is_lost = is_lost(of_gap, shown_of_both, row_before, row_after);
+        let beside = |row: &usize| Beside {
+            counts: Wheels::from_sides(|side| shown[side][*row]),
+            length_s: t_s[row + 1] - t_s[*row],
+        };
+        let (is_lost, likely_lost) = match (before.first(), after.first()) {
+            (Some(before), Some(after)) => {
+                is_lost(of_gap, t_s[k + 1] - t_s[k], shown_of_both, [before, after].map(beside))
+            }
+            _ => (None, false),
+        };
         match is_lost {
             Some(true) => missing.lost += 1,
             Some(false) => missing.kept += 1,
             None => {}
         }
         let lacks = Wheels::from_sides(|side| due[side] - shown[side][k]);
-        found.push(Gap { row: k, missing: of_gap.round() - 1.0, lacks, is_lost });
+        found.push(Gap { row: k, missing: of_gap.round() - 1.0, lacks, is_lost, likely_lost });
     }
     (found, missing)
 }
@@ -279,7 +306,12 @@ fn fill(run: &mut Run, gaps: &[Gap], short: ShortGaps) -> f64 {
     let mut next = gaps.iter().peekable();
     for k in 0..ticks.left.len().saturating_sub(1) {
         if let Some(gap) = next.next_if(|gap| gap.row == k) {
-            if gap.is_lost.unwrap_or(short == ShortGaps::Lost) {
+            let untold = match short {
+                ShortGaps::Lost => true,
+                ShortGaps::Either => gap.likely_lost,
+                ShortGaps::Unknown | ShortGaps::AsTheyAre => false,
+            };
+            if gap.is_lost.unwrap_or(untold) {
                 lost = lost.zip_with(gap.lacks, |lost, lacks| lost + lacks);
                 missing += gap.missing;
             }
@@ -378,8 +410,7 @@ mod tests {
         let (record, whole) = odometry(&[9, 30, 31, 50], false);
         let mut run = Run { odometry: record, ..Run::default() };
         let (gaps, missing) = gaps(&run);
-        // The gap on the ramp does not tell: half of what is due at its end is what its start shows.
-        assert_eq!((missing.lost, missing.kept), (0, 2));
+        assert_eq!((missing.lost, missing.kept), (0, 3));
         fill(&mut run, &gaps, ShortGaps::AsTheyAre);
         assert_eq!(run.odometry.wheels, WheelLog::Ticks(Wheels { left: whole.clone(), right: whole }));
     }
