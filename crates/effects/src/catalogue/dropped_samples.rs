@@ -212,8 +212,8 @@ struct Beside {
     length_s: f64,
 }
 
-/// Whether the counts of a gap of so many rows were lost, by what both wheels show over it and what each shows
-/// in the row before it and in that after it: `None` where that does not tell, and what is likelier.
+/// Whether the counts of a gap of so many rows were lost, by what both wheels show over it and what each
+/// shows in the row before it and in that after it: `None` where that does not tell, and what is likelier.
 ///
 /// Speeds in the gap lie between those beside it; where a wheel started, stopped or turned round, it may have
 /// stood. If counts were lost, the gap shows one row's at such a speed, if not, those of all its rows. Where
