@@ -9,15 +9,18 @@
 //! Alias: `missed_counts`.
 //! Reference: serial links without acknowledgement, full queues.
 
-use dataset::{Dataset, Odometry, Run, Timestamps, UnknownMotion, WheelLog};
+use dataset::{Dataset, Run, UnknownMotion, WheelLog};
 use kinematics::{Side, Wheels};
 use serde::{Deserialize, Serialize};
 
+mod gaps;
+
+use self::gaps::{Gap, Missing, ShortGaps, gaps};
 use crate::benchmark::Benchmark;
 use crate::description::{Description, RecordFault};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
-use crate::hypothesis::{Hypothesis, RecordCorrection, median, value_of};
+use crate::hypothesis::{Hypothesis, RecordCorrection, value_of};
 use crate::on_board::OnBoard;
 use crate::stream::Stream;
 
@@ -89,91 +92,8 @@ impl Forward for State {
     }
 }
 
-/// Where rows are too few to have a beat: an interval longer than the usual one by this factor is nearer to
-/// two of them. It may be a gap, or a pause of the log, and the counts tell.
-const GAP_RATIO: f64 = 1.5;
-/// Counts that what both wheels show, over a row or a gap, may be off by as they are rounded: one of each.
-const MAX_ROUNDING: f64 = 2.0;
-/// Rows to either side of a gap that say how fast the wheels turned: their rounding is a third of a row's.
-const ROWS_AROUND: usize = 3;
-/// Where so many times as many gaps lost counts as did not, all did: those that did not are mistakes.
-const ALL_LOST_RATIO: usize = 4;
-/// With so many gaps that lost counts, the log itself shows the fault.
-const MIN_VISIBLE_FAULTS: usize = 3;
-/// Share of the gaps that are taken for such that lost their counts and did not, at the most: four times what
-/// logs show whose counters go on.
-const MAX_MISJUDGED_SHARE: f64 = 0.1;
 /// Share of the pairs of successive measurements that gaps may spoil for the rest to be enough.
 const MAX_SPOILED_PAIRS: f64 = 0.5;
-
-/// What the gaps of some runs say.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-struct Missing {
-    /// Gaps over which a moving robot lost counts.
-    lost: usize,
-    /// Gaps over which it did not.
-    kept: usize,
-    /// The numbers of the rows are not certain.
-    uncertain: bool,
-    /// Rows wait for each other: a gap may be one that was held up.
-    is_bunched: bool,
-}
-
-/// What gaps did that are too short to tell.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum ShortGaps {
-    /// They lost their counts, as nearly all did that tell.
-    Lost,
-    /// Some did and some did not: what is likelier counts, but nothing can be compared across them.
-    Either,
-    /// They may be no gaps at all: what they show counts, but nothing can be compared across them.
-    Unknown,
-    /// They kept them.
-    AsTheyAre,
-}
-
-impl Missing {
-    /// Whether more gaps lost their counts than are misjudged.
-    fn some_lost(&self) -> bool {
-        self.lost as f64 > MAX_MISJUDGED_SHARE * (self.lost + self.kept) as f64
-    }
-
-    /// Whether the log itself shows the fault.
-    fn is_visible(&self) -> bool {
-        self.lost >= MIN_VISIBLE_FAULTS && self.some_lost() && !self.uncertain
-    }
-
-    fn short_gaps(&self) -> ShortGaps {
-        if !self.some_lost() {
-            ShortGaps::AsTheyAre
-        } else if self.uncertain || self.is_bunched {
-            // Where numbers of rows are wrong, or a row was held up, one that does not tell may be none.
-            ShortGaps::Unknown
-        } else if self.lost > ALL_LOST_RATIO * self.kept {
-            ShortGaps::Lost
-        } else {
-            ShortGaps::Either
-        }
-    }
-}
-
-/// Rows from each row to the next: more than one where rows are missing between them. By the beat, as stamps
-/// may jitter, and whether that is uncertain; by time where there is none. One that came by itself is none.
-fn rows_after(t_s: &Timestamps) -> Option<(Vec<f64>, bool)> {
-    if let Some(period) = t_s.sampling_period() {
-        // Where some numbers of rows are wrong, the log alone shows nothing.
-        let uncertain = !period.is_certain();
-        return Some((period.numbers.windows(2).map(|pair| (pair[1] - pair[0]) as f64).collect(), uncertain));
-    }
-    let lengths_s: Vec<f64> = t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let usual_s = median(lengths_s.clone()).filter(|usual_s| *usual_s > 0.0)?;
-    let rows = |length_s: &f64| match length_s / usual_s {
-        ratio if ratio > GAP_RATIO => ratio,
-        ratio if ratio * GAP_RATIO < 1.0 => 0.0,
-        _ => 1.0,
-    };
-    Some((lengths_s.iter().map(rows).collect(), false))
-}
 
 /// Share of the pairs of successive measurements of some runs whose motion the counts leave open.
 fn spoiled_pairs(runs: &[Run]) -> f64 {
@@ -187,115 +107,6 @@ fn spoiled_pairs(runs: &[Run]) -> f64 {
         }
     }
     if pairs > 0.0 { spoiled / pairs } else { 1.0 }
-}
-
-/// A gap of some rows.
-#[derive(Debug, Clone, Copy)]
-struct Gap {
-    /// The row before it.
-    row: usize,
-    /// Rows that are missing.
-    missing: f64,
-    /// Counts that it lacks of those due at the speed of the rows before and after it together: exactly so
-    /// where the acceleration is constant; the row after it shows less.
-    lacks: Wheels<f64>,
-    /// Whether they were lost; `None` where its counts do not tell.
-    is_lost: Option<bool>,
-    /// Whether it shows less than halfway between one row's counts and those of all its rows.
-    likely_lost: bool,
-}
-
-/// A row beside a gap.
-#[derive(Debug, Clone, Copy)]
-struct Beside {
-    counts: Wheels<f64>,
-    length_s: f64,
-}
-
-/// Whether the counts of a gap of so many rows were lost, by what both wheels show over it and what each
-/// shows in the row before it and in that after it: `None` where that does not tell, and what is likelier.
-///
-/// Speeds in the gap lie between those beside it; where a wheel started, stopped or turned round, it may have
-/// stood. If counts were lost, the gap shows one row's at such a speed, if not, those of all its rows. Where
-/// stamps jitter, rows may be of the same length or as long as they say.
-fn is_lost(rows: f64, length_s: f64, shown: f64, beside: [Beside; 2]) -> (Option<bool>, bool) {
-    let row_s = length_s / rows;
-    let as_long_as_said = beside.map(|row| row.counts.map(|counts| counts * row_s / row.length_s));
-    // Counts of a row at the least and at the greatest speed.
-    let range = |[before, after]: [Wheels<f64>; 2]| {
-        Side::BOTH.into_iter().fold((0.0, 0.0), |(least, most), side| {
-            let [before, after] = [before[side], after[side]];
-            let of_side = if before * after > 0.0 { before.abs().min(after.abs()) } else { 0.0 };
-            (least + of_side, most + before.abs().max(after.abs()))
-        })
-    };
-    let (evenly, said) = (range(beside.map(|row| row.counts)), range(as_long_as_said));
-    let (least, most) = (f64::min(evenly.0, said.0), f64::max(evenly.1, said.1));
-    let [can_be_kept, can_be_lost] = [
-        shown + MAX_ROUNDING >= rows * (least - MAX_ROUNDING),
-        shown - MAX_ROUNDING <= most + MAX_ROUNDING,
-    ];
-    let likely_lost = shown < 0.25 * (1.0 + rows) * (least + most);
-    let is_lost = match (can_be_kept, can_be_lost) {
-        (true, true) => None,
-        (false, false) => Some(likely_lost),
-        (_, lost) => Some(lost),
-    };
-    (is_lost, likely_lost)
-}
-
-/// The gaps of a run over which its wheels turned, and what they say of missing rows.
-fn gaps(run: &Run) -> (Vec<Gap>, Missing) {
-    let mut missing = Missing::default();
-    let Odometry { t_s, wheels: WheelLog::Ticks(ticks), .. } = &run.odometry else { return (Vec::new(), missing) };
-    let Some((rows, uncertain)) = rows_after(t_s) else { return (Vec::new(), missing) };
-    missing.uncertain = uncertain;
-    missing.is_bunched = t_s.sampling_period().is_some_and(|period| period.is_bunched);
-    let shown =
-        ticks.as_ref().map(|column| column.windows(2).map(|pair| (pair[1] - pair[0]) as f64).collect::<Vec<_>>());
-    let is_row = |k: &usize| rows[*k] == 1.0;
-    let mut found = Vec::new();
-    for (k, &of_gap) in rows.iter().enumerate().filter(|(_, of_gap)| **of_gap > 1.0) {
-        let before: Vec<usize> = (0..k).rev().filter(is_row).take(ROWS_AROUND).collect();
-        let after: Vec<usize> = (k + 1..rows.len()).filter(is_row).take(ROWS_AROUND).collect();
-        let of_each = match before.len().min(after.len()) {
-            0 => ROWS_AROUND,
-            of_each => of_each,
-        };
-        let sides = [&before[..of_each.min(before.len())], &after[..of_each.min(after.len())]];
-        let around: Vec<usize> = sides.concat();
-        let time_s: f64 = around.iter().map(|near| t_s[near + 1] - t_s[*near]).sum();
-        let counts_of = |rows: &[usize]| {
-            Wheels::from_sides(|side| rows.iter().map(|near| shown[side][*near]).sum::<f64>())
-        };
-        // Counts of the gap at the speed around it, and of a row to either side of it.
-        let due = counts_of(&around).map(|counts| match time_s > 0.0 {
-            true => counts / time_s * (t_s[k + 1] - t_s[k]),
-            false => 0.0,
-        });
-        let shown_of_both = shown.left[k].abs() + shown.right[k].abs();
-        if due == Wheels::both(0.0) && shown_of_both == 0.0 {
-            continue;
-        }
-        let beside = |row: &usize| Beside {
-            counts: Wheels::from_sides(|side| shown[side][*row]),
-            length_s: t_s[row + 1] - t_s[*row],
-        };
-        let (is_lost, likely_lost) = match (before.first(), after.first()) {
-            (Some(before), Some(after)) => {
-                is_lost(of_gap, t_s[k + 1] - t_s[k], shown_of_both, [before, after].map(beside))
-            }
-            _ => (None, false),
-        };
-        match is_lost {
-            Some(true) => missing.lost += 1,
-            Some(false) => missing.kept += 1,
-            None => {}
-        }
-        let lacks = Wheels::from_sides(|side| due[side] - shown[side][k]);
-        found.push(Gap { row: k, missing: of_gap.round() - 1.0, lacks, is_lost, likely_lost });
-    }
-    (found, missing)
 }
 
 /// Carries the counts of gaps on that lost them, and says how many rows were missing. At low speeds no gap
@@ -335,12 +146,13 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
         missing.kept += of_run.kept;
         missing.uncertain |= of_run.uncertain;
         missing.is_bunched |= of_run.is_bunched;
+        missing.lost_share.join(&of_run.lost_share);
     }
-    if missing.lost == 0 {
+    let short = missing.short_gaps();
+    if missing.lost == 0 && short != ShortGaps::Lost {
         return Vec::new();
     }
     let mut records = dataset.clone();
-    let short = missing.short_gaps();
     let (mut missing_rows, mut rows) = (0.0, 0.0);
     for (run, (gaps, _)) in records.runs.iter_mut().zip(&of_runs) {
         missing_rows += fill(run, gaps, short);
@@ -362,6 +174,8 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
 
 #[cfg(test)]
 mod tests {
+    use dataset::Odometry;
+
     use super::*;
 
     /// A robot that speeds up, cruises, and slows down, with rows that jitter and counts that are true at
@@ -441,8 +255,7 @@ mod tests {
         assert_eq!(whole.last().copied().zip(ticks.left.last().copied()).map(|(of, is)| of - is), Some(1));
     }
 
-    /// Where some gaps lost their counts and some did not, as where a link loses rows and a counter increments:
-    /// the log shows the fault however many did not.
+    /// Where some gaps lost their counts and some did not: the log shows the fault however many did not.
     #[test]
     fn regress_gaps_of_both_kinds_leave_open_what_a_short_one_did() {
         // Ten counts a row from the second second on, one before.

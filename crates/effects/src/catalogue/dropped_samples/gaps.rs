@@ -1,0 +1,309 @@
+//! Gaps of a log's rows, and whether the counts of the missing rows were lost with them: gap by gap where the
+//! rows beside it tell, by all of the others together where they do not.
+
+use dataset::{Odometry, Run, Timestamps, WheelLog};
+use kinematics::{Side, Wheels};
+
+use crate::hypothesis::median;
+
+/// Where rows are too few to have a beat: an interval longer than the usual one by this factor is nearer to
+/// two of them. It may be a gap, or a pause of the log, and the counts tell.
+const GAP_RATIO: f64 = 1.5;
+/// Counts that what both wheels show, over a row or a gap, may be off by as they are rounded: one of each.
+const MAX_ROUNDING: f64 = 2.0;
+/// Rows to either side of a gap that say how fast the wheels turned: their rounding is a third of a row's.
+const ROWS_AROUND: usize = 3;
+/// Where so many times as many gaps lost counts as did not, all did: those that did not are mistakes.
+const ALL_LOST_RATIO: usize = 4;
+/// With so many gaps that lost counts, the log itself shows the fault.
+const MIN_VISIBLE_FAULTS: usize = 3;
+/// Share of the gaps that are taken for such that lost their counts and did not, at the most: four times what
+/// logs show whose counters go on.
+const MAX_MISJUDGED_SHARE: f64 = 0.1;
+/// Wheels of gaps from which on they tell together, and by how many standard errors of a share that is nearer
+/// to all than to none: by chance in three logs of a thousand.
+const MIN_TOGETHER: usize = 20;
+const TOGETHER_SIGMAS: f64 = 3.0;
+
+/// What the gaps of some runs say.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Missing {
+    /// Gaps over which a moving robot lost counts.
+    pub(super) lost: usize,
+    /// Gaps over which it did not.
+    pub(super) kept: usize,
+    /// The numbers of the rows are not certain.
+    pub(super) uncertain: bool,
+    /// Rows wait for each other: a gap may be one that was held up.
+    pub(super) is_bunched: bool,
+    /// What the gaps that need not tell say together.
+    pub(super) lost_share: LostShare,
+}
+
+/// Sums over gaps that need not tell by themselves: of what counts each lacks, x, over those of its missing
+/// rows, m, it has the share of these that were lost as its slope, with a standard error without a model of x.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct LostShare {
+    gaps: usize,
+    mm: f64,
+    mx: f64,
+    /// Of m² times x², xm and m².
+    scatter: [f64; 3],
+}
+
+impl LostShare {
+    fn add(&mut self, missing: f64, lacks: f64) {
+        let mm = missing * missing;
+        self.gaps += 1;
+        self.mm += mm;
+        self.mx += missing * lacks;
+        for (sum, of) in self.scatter.iter_mut().zip([lacks * lacks, missing * lacks, mm]) {
+            *sum += mm * of;
+        }
+    }
+
+    pub(super) fn join(&mut self, other: &Self) {
+        self.gaps += other.gaps;
+        self.mm += other.mm;
+        self.mx += other.mx;
+        for (sum, of) in self.scatter.iter_mut().zip(other.scatter) {
+            *sum += of;
+        }
+    }
+
+    /// Whether they lost their counts; `None` where they are too few to tell, or some did and some did not.
+    fn are_lost(&self) -> Option<bool> {
+        if self.gaps < MIN_TOGETHER || self.mm <= 0.0 {
+            return None;
+        }
+        let share = self.mx / self.mm;
+        let [xx, xm, mm] = self.scatter;
+        let sigma = (xx - 2.0 * share * xm + share * share * mm).max(0.0).sqrt() / self.mm;
+        let is_near = |of: f64| (share - of).abs() + TOGETHER_SIGMAS * sigma < 0.5;
+        if is_near(1.0) {
+            Some(true)
+        } else if is_near(0.0) {
+            Some(false)
+        } else {
+            None
+        }
+    }
+}
+
+/// What gaps did that are too short to tell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum ShortGaps {
+    /// They lost their counts, as nearly all did that tell.
+    Lost,
+    /// Some did and some did not: what is likelier counts, but nothing can be compared across them.
+    Either,
+    /// They may be no gaps at all: what they show counts, but nothing can be compared across them.
+    Unknown,
+    /// They kept them.
+    AsTheyAre,
+}
+
+impl Missing {
+    /// Whether more gaps lost their counts than are misjudged.
+    fn some_lost(&self) -> bool {
+        self.lost as f64 > MAX_MISJUDGED_SHARE * (self.lost + self.kept) as f64
+    }
+
+    /// Whether the log itself shows the fault.
+    pub(super) fn is_visible(&self) -> bool {
+        let by_some = self.lost >= MIN_VISIBLE_FAULTS && self.some_lost();
+        (by_some || self.short_gaps() == ShortGaps::Lost && self.lost_share.are_lost() == Some(true))
+            && !self.uncertain
+    }
+
+    pub(super) fn short_gaps(&self) -> ShortGaps {
+        let are_lost = self.lost_share.are_lost();
+        if are_lost == Some(true) && self.lost >= self.kept {
+            ShortGaps::Lost
+        } else if are_lost == Some(false) || !self.some_lost() {
+            ShortGaps::AsTheyAre
+        } else if self.uncertain || self.is_bunched {
+            // Where numbers of rows are wrong, or a row was held up, one that does not tell may be none.
+            ShortGaps::Unknown
+        } else if self.lost > ALL_LOST_RATIO * self.kept {
+            ShortGaps::Lost
+        } else {
+            ShortGaps::Either
+        }
+    }
+}
+
+/// Rows from each row to the next: more than one where rows are missing between them. By the beat, as stamps
+/// may jitter, and whether that is uncertain; by time where there is none. One that came by itself is none.
+fn rows_after(t_s: &Timestamps) -> Option<(Vec<f64>, bool)> {
+    if let Some(period) = t_s.sampling_period() {
+        // Where some numbers of rows are wrong, the log alone shows nothing.
+        let uncertain = !period.is_certain();
+        return Some((period.numbers.windows(2).map(|pair| (pair[1] - pair[0]) as f64).collect(), uncertain));
+    }
+    let lengths_s: Vec<f64> = t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let usual_s = median(lengths_s.clone()).filter(|usual_s| *usual_s > 0.0)?;
+    let rows = |length_s: &f64| match length_s / usual_s {
+        ratio if ratio > GAP_RATIO => ratio,
+        ratio if ratio * GAP_RATIO < 1.0 => 0.0,
+        _ => 1.0,
+    };
+    Some((lengths_s.iter().map(rows).collect(), false))
+}
+
+/// A gap of some rows.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Gap {
+    /// The row before it.
+    pub(super) row: usize,
+    /// Rows that are missing.
+    pub(super) missing: f64,
+    /// Counts that it lacks of those due at the speed of the rows before and after it together: exactly so
+    /// where the acceleration is constant; the row after it shows less.
+    pub(super) lacks: Wheels<f64>,
+    /// Whether they were lost; `None` where its counts do not tell.
+    pub(super) is_lost: Option<bool>,
+    /// Whether it shows less than halfway between one row's counts and those of all its rows.
+    pub(super) likely_lost: bool,
+}
+
+/// A row beside a gap.
+#[derive(Debug, Clone, Copy)]
+struct Beside {
+    counts: Wheels<f64>,
+    length_s: f64,
+}
+
+/// What a gap says of its counts.
+#[derive(Debug, Clone, Copy, Default)]
+struct GapJudgement {
+    is_lost: Option<bool>,
+    likely_lost: bool,
+    /// Whether it tells whatever it shows. All others are judged together: those alone that happen to show
+    /// nothing clear would be a choice by what is asked.
+    can_tell: bool,
+}
+
+/// Whether the counts of a gap of so many rows were lost, by what both wheels show over it and what each
+/// shows in the row before it and in that after it: `None` where that does not tell, and what is likelier.
+///
+/// Speeds in the gap lie between those beside it; where a wheel started, stopped or turned round, it may have
+/// stood. If counts were lost, the gap shows one row's at such a speed, if not, those of all its rows. Where
+/// stamps jitter, rows may be of the same length or as long as they say.
+fn is_lost(rows: f64, length_s: f64, shown: f64, beside: [Beside; 2]) -> GapJudgement {
+    let row_s = length_s / rows;
+    let as_long_as_said = beside.map(|row| row.counts.map(|counts| counts * row_s / row.length_s));
+    // Counts of a row at the least and at the greatest speed.
+    let range = |[before, after]: [Wheels<f64>; 2]| {
+        Side::BOTH.into_iter().fold((0.0, 0.0), |(least, most), side| {
+            let [before, after] = [before[side], after[side]];
+            let of_side = if before * after > 0.0 { before.abs().min(after.abs()) } else { 0.0 };
+            (least + of_side, most + before.abs().max(after.abs()))
+        })
+    };
+    let (evenly, said) = (range(beside.map(|row| row.counts)), range(as_long_as_said));
+    let (least, most) = (f64::min(evenly.0, said.0), f64::max(evenly.1, said.1));
+    let [can_be_kept, can_be_lost] = [
+        shown + MAX_ROUNDING >= rows * (least - MAX_ROUNDING),
+        shown - MAX_ROUNDING <= most + MAX_ROUNDING,
+    ];
+    let likely_lost = shown < 0.25 * (1.0 + rows) * (least + most);
+    let is_lost = match (can_be_kept, can_be_lost) {
+        (true, true) => None,
+        (false, false) => Some(likely_lost),
+        (_, lost) => Some(lost),
+    };
+    let can_tell = rows * (least - MAX_ROUNDING) > most + 3.0 * MAX_ROUNDING;
+    GapJudgement { is_lost, likely_lost, can_tell }
+}
+
+/// The gaps of a run over which its wheels turned, and what they say of missing rows.
+pub(super) fn gaps(run: &Run) -> (Vec<Gap>, Missing) {
+    let mut missing = Missing::default();
+    let Odometry { t_s, wheels: WheelLog::Ticks(ticks), .. } = &run.odometry else { return (Vec::new(), missing) };
+    let Some((rows, uncertain)) = rows_after(t_s) else { return (Vec::new(), missing) };
+    missing.uncertain = uncertain;
+    missing.is_bunched = t_s.sampling_period().is_some_and(|period| period.is_bunched);
+    let shown =
+        ticks.as_ref().map(|column| column.windows(2).map(|pair| (pair[1] - pair[0]) as f64).collect::<Vec<_>>());
+    let is_row = |k: &usize| rows[*k] == 1.0;
+    let mut found = Vec::new();
+    for (k, &of_gap) in rows.iter().enumerate().filter(|(_, of_gap)| **of_gap > 1.0) {
+        let before: Vec<usize> = (0..k).rev().filter(is_row).take(ROWS_AROUND).collect();
+        let after: Vec<usize> = (k + 1..rows.len()).filter(is_row).take(ROWS_AROUND).collect();
+        let of_each = match before.len().min(after.len()) {
+            0 => ROWS_AROUND,
+            of_each => of_each,
+        };
+        let sides = [&before[..of_each.min(before.len())], &after[..of_each.min(after.len())]];
+        let around: Vec<usize> = sides.concat();
+        let time_s: f64 = around.iter().map(|near| t_s[near + 1] - t_s[*near]).sum();
+        let counts_of = |rows: &[usize]| {
+            Wheels::from_sides(|side| rows.iter().map(|near| shown[side][*near]).sum::<f64>())
+        };
+        // Counts of the gap at the speed around it, and of a row to either side of it.
+        let due = counts_of(&around).map(|counts| match time_s > 0.0 {
+            true => counts / time_s * (t_s[k + 1] - t_s[k]),
+            false => 0.0,
+        });
+        let shown_of_both = shown.left[k].abs() + shown.right[k].abs();
+        if due == Wheels::both(0.0) && shown_of_both == 0.0 {
+            continue;
+        }
+        let beside = |row: &usize| Beside {
+            counts: Wheels::from_sides(|side| shown[side][*row]),
+            length_s: t_s[row + 1] - t_s[*row],
+        };
+        let GapJudgement { is_lost, likely_lost, can_tell } = match (before.first(), after.first()) {
+            (Some(before), Some(after)) => {
+                is_lost(of_gap, t_s[k + 1] - t_s[k], shown_of_both, [before, after].map(beside))
+            }
+            _ => GapJudgement::default(),
+        };
+        let lacks = Wheels::from_sides(|side| due[side] - shown[side][k]);
+        match is_lost {
+            Some(true) => missing.lost += 1,
+            Some(false) => missing.kept += 1,
+            None => {}
+        }
+        if !can_tell {
+            for side in Side::BOTH {
+                missing.lost_share.add(due[side] * (of_gap - 1.0) / of_gap, lacks[side]);
+            }
+        }
+        found.push(Gap { row: k, missing: of_gap.round() - 1.0, lacks, is_lost, likely_lost });
+    }
+    (found, missing)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Less than two counts a row: no gap that lost them tells by itself, and all do together.
+    #[test]
+    fn short_gaps_tell_together_what_none_tells_alone() {
+        let run = |loses: fn(usize) -> bool| {
+            let (mut t_s, mut column, mut lost) = (Vec::new(), Vec::new(), 0);
+            for row in 0..600 {
+                // Whose rounding is another one at each gap.
+                let counted = |row: usize| (1.7317 * row as f64).floor() as i64;
+                if row % 20 == 10 {
+                    lost += if loses(row) { counted(row) - counted(row - 1) } else { 0 };
+                    continue;
+                }
+                t_s.push(0.05 * row as f64);
+                column.push(counted(row) - lost);
+            }
+            let wheels = WheelLog::Ticks(Wheels { left: column.clone(), right: column });
+            gaps(&Run { odometry: Odometry { t_s: t_s.into(), wheels, ..Odometry::default() }, ..Run::default() }).1
+        };
+        let (all, none, half) = (run(|_| true), run(|_| false), run(|row| row % 40 == 10));
+        assert_eq!([all, none, half].map(|of| of.lost), [0; 3]);
+        assert_eq!([all, none, half].map(|of| of.lost_share.gaps), [60; 3], "both wheels of 30 gaps");
+        assert_eq!([all, none, half].map(|of| of.lost_share.are_lost()), [Some(true), Some(false), None]);
+        assert_eq!(all.short_gaps(), ShortGaps::Lost);
+        assert_eq!(none.short_gaps(), ShortGaps::AsTheyAre);
+        assert!(all.is_visible() && !none.is_visible() && !half.is_visible());
+    }
+}
