@@ -41,7 +41,7 @@ pub(super) struct Missing {
 }
 
 /// Sums over gaps that need not tell by themselves: of what counts each lacks, x, over those of its missing
-/// rows, m, it has the share of these that were lost as its slope, with a standard error without a model of x.
+/// rows, m, the share of these that were lost is its slope, with a standard error of no model.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct LostShare {
     gaps: usize,
