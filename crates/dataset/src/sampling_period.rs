@@ -24,6 +24,9 @@ const MAX_WHOLE_GAP_ERROR: f64 = 0.05;
 /// The same where rows came by themselves between them, and stamps are exact: far below what stamps are off
 /// by that were restored from receipt, some tenths of a per mil.
 const MAX_EXACT_GAP_ERROR: f64 = 1e-4;
+/// Share of the sampling period by which a row that came by itself is off the tick that it counts as; one that
+/// is further off came after the tick before it.
+const MAX_OFF_NEXT_TICK: f64 = 0.01;
 /// Share of the rows that came by themselves beside an exact beat at the most: a quarter of what the beat is
 /// told from.
 const MAX_SHARE_BY_THEMSELVES: f64 = 0.25;
@@ -240,7 +243,7 @@ fn numbers_beside_rows_of_their_own(t_s: &[f64], period_s: f64) -> Option<Vec<i6
             numbers.push(number);
         } else {
             // Of the tick before it, or of that which it is next to.
-            let next = (since_due - since_due.round()).abs() <= MAX_EXACT_GAP_ERROR.sqrt();
+            let next = (since_due - since_due.round()).abs() <= MAX_OFF_NEXT_TICK;
             let ticks = if next { since_due.round() } else { since_due.floor() };
             numbers.push((number + ticks as i64).max(last));
             by_themselves += 1;

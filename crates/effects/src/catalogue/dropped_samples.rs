@@ -119,14 +119,14 @@ fn fill(run: &mut Run, gaps: &[Gap], short: ShortGaps) -> f64 {
         if let Some(gap) = next.next_if(|gap| gap.row == k) {
             let untold = match short {
                 ShortGaps::Lost => true,
-                ShortGaps::Either => gap.likely_lost,
+                ShortGaps::Either => gap.judgement.likely_lost,
                 ShortGaps::Unknown | ShortGaps::AsTheyAre => false,
             };
-            if gap.is_lost.unwrap_or(untold) {
+            if gap.judgement.is_lost.unwrap_or(untold) {
                 lost = lost.zip_with(gap.lacks, |lost, lacks| lost + lacks);
                 missing += gap.missing;
             }
-            if short == ShortGaps::Lost || gap.is_lost.unwrap_or(short != ShortGaps::AsTheyAre) {
+            if short == ShortGaps::Lost || gap.judgement.is_lost.unwrap_or(short != ShortGaps::AsTheyAre) {
                 spans.push(UnknownMotion { from_s: run.odometry.t_s[k], to_s: run.odometry.t_s[k + 1] });
             }
         }
@@ -142,11 +142,7 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
     let of_runs: Vec<(Vec<Gap>, Missing)> = dataset.runs.iter().map(gaps).collect();
     let mut missing = Missing::default();
     for (_, of_run) in &of_runs {
-        missing.lost += of_run.lost;
-        missing.kept += of_run.kept;
-        missing.uncertain |= of_run.uncertain;
-        missing.is_bunched |= of_run.is_bunched;
-        missing.lost_share.join(&of_run.lost_share);
+        missing.join(of_run);
     }
     let short = missing.short_gaps();
     if missing.lost == 0 && short != ShortGaps::Lost {

@@ -62,7 +62,7 @@ impl LostShare {
         }
     }
 
-    pub(super) fn join(&mut self, other: &Self) {
+    fn join(&mut self, other: &Self) {
         self.gaps += other.gaps;
         self.mm += other.mm;
         self.mx += other.mx;
@@ -93,7 +93,7 @@ impl LostShare {
 /// What gaps did that are too short to tell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ShortGaps {
-    /// They lost their counts, as nearly all did that tell.
+    /// They lost their counts, as they say together or as nearly all did that tell.
     Lost,
     /// Some did and some did not: what is likelier counts, but nothing can be compared across them.
     Either,
@@ -104,6 +104,20 @@ pub(super) enum ShortGaps {
 }
 
 impl Missing {
+    pub(super) fn join(&mut self, other: &Self) {
+        self.lost += other.lost;
+        self.kept += other.kept;
+        self.uncertain |= other.uncertain;
+        self.is_bunched |= other.is_bunched;
+        self.lost_share.join(&other.lost_share);
+    }
+
+    /// Whether gaps that need not tell lost their counts by what they say together, and those that tell do not
+    /// deny it.
+    fn all_lost_together(&self) -> bool {
+        self.lost_share.are_lost() == Some(true) && self.lost >= self.kept
+    }
+
     /// Whether more gaps lost their counts than are misjudged.
     fn some_lost(&self) -> bool {
         self.lost as f64 > MAX_MISJUDGED_SHARE * (self.lost + self.kept) as f64
@@ -112,15 +126,13 @@ impl Missing {
     /// Whether the log itself shows the fault.
     pub(super) fn is_visible(&self) -> bool {
         let by_some = self.lost >= MIN_VISIBLE_FAULTS && self.some_lost();
-        (by_some || self.short_gaps() == ShortGaps::Lost && self.lost_share.are_lost() == Some(true))
-            && !self.uncertain
+        (by_some || self.all_lost_together()) && !self.uncertain
     }
 
     pub(super) fn short_gaps(&self) -> ShortGaps {
-        let are_lost = self.lost_share.are_lost();
-        if are_lost == Some(true) && self.lost >= self.kept {
+        if self.all_lost_together() {
             ShortGaps::Lost
-        } else if are_lost == Some(false) || !self.some_lost() {
+        } else if self.lost_share.are_lost() == Some(false) || !self.some_lost() {
             ShortGaps::AsTheyAre
         } else if self.uncertain || self.is_bunched {
             // Where numbers of rows are wrong, or a row was held up, one that does not tell may be none.
@@ -161,10 +173,7 @@ pub(super) struct Gap {
     /// Counts that it lacks of those due at the speed of the rows before and after it together: exactly so
     /// where the acceleration is constant; the row after it shows less.
     pub(super) lacks: Wheels<f64>,
-    /// Whether they were lost; `None` where its counts do not tell.
-    pub(super) is_lost: Option<bool>,
-    /// Whether it shows less than halfway between one row's counts and those of all its rows.
-    pub(super) likely_lost: bool,
+    pub(super) judgement: GapJudgement,
 }
 
 /// A row beside a gap.
@@ -176,9 +185,11 @@ struct Beside {
 
 /// What a gap says of its counts.
 #[derive(Debug, Clone, Copy, Default)]
-struct GapJudgement {
-    is_lost: Option<bool>,
-    likely_lost: bool,
+pub(super) struct GapJudgement {
+    /// Whether they were lost; `None` where they do not tell.
+    pub(super) is_lost: Option<bool>,
+    /// Whether it shows less than halfway between one row's counts and those of all its rows.
+    pub(super) likely_lost: bool,
     /// Whether it tells whatever it shows. All others are judged together: those alone that happen to show
     /// nothing clear would be a choice by what is asked.
     can_tell: bool,
@@ -190,7 +201,7 @@ struct GapJudgement {
 /// Speeds in the gap lie between those beside it; where a wheel started, stopped or turned round, it may have
 /// stood. If counts were lost, the gap shows one row's at such a speed, if not, those of all its rows. Where
 /// stamps jitter, rows may be of the same length or as long as they say.
-fn is_lost(rows: f64, length_s: f64, shown: f64, beside: [Beside; 2]) -> GapJudgement {
+fn judged(rows: f64, length_s: f64, shown: f64, beside: [Beside; 2]) -> GapJudgement {
     let row_s = length_s / rows;
     let as_long_as_said = beside.map(|row| row.counts.map(|counts| counts * row_s / row.length_s));
     // Counts of a row at the least and at the greatest speed.
@@ -203,18 +214,16 @@ fn is_lost(rows: f64, length_s: f64, shown: f64, beside: [Beside; 2]) -> GapJudg
     };
     let (evenly, said) = (range(beside.map(|row| row.counts)), range(as_long_as_said));
     let (least, most) = (f64::min(evenly.0, said.0), f64::max(evenly.1, said.1));
-    let [can_be_kept, can_be_lost] = [
-        shown + MAX_ROUNDING >= rows * (least - MAX_ROUNDING),
-        shown - MAX_ROUNDING <= most + MAX_ROUNDING,
-    ];
+    // What the gap shows at the least where it kept its counts, and at the most where it lost them.
+    let least_kept = rows * (least - MAX_ROUNDING) - MAX_ROUNDING;
+    let most_lost = most + 2.0 * MAX_ROUNDING;
     let likely_lost = shown < 0.25 * (1.0 + rows) * (least + most);
-    let is_lost = match (can_be_kept, can_be_lost) {
+    let is_lost = match (shown >= least_kept, shown <= most_lost) {
         (true, true) => None,
         (false, false) => Some(likely_lost),
         (_, lost) => Some(lost),
     };
-    let can_tell = rows * (least - MAX_ROUNDING) > most + 3.0 * MAX_ROUNDING;
-    GapJudgement { is_lost, likely_lost, can_tell }
+    GapJudgement { is_lost, likely_lost, can_tell: least_kept > most_lost }
 }
 
 /// The gaps of a run over which its wheels turned, and what they say of missing rows.
@@ -254,24 +263,24 @@ pub(super) fn gaps(run: &Run) -> (Vec<Gap>, Missing) {
             counts: Wheels::from_sides(|side| shown[side][*row]),
             length_s: t_s[row + 1] - t_s[*row],
         };
-        let GapJudgement { is_lost, likely_lost, can_tell } = match (before.first(), after.first()) {
+        let judgement = match (before.first(), after.first()) {
             (Some(before), Some(after)) => {
-                is_lost(of_gap, t_s[k + 1] - t_s[k], shown_of_both, [before, after].map(beside))
+                judged(of_gap, t_s[k + 1] - t_s[k], shown_of_both, [before, after].map(beside))
             }
             _ => GapJudgement::default(),
         };
         let lacks = Wheels::from_sides(|side| due[side] - shown[side][k]);
-        match is_lost {
+        match judgement.is_lost {
             Some(true) => missing.lost += 1,
             Some(false) => missing.kept += 1,
             None => {}
         }
-        if !can_tell {
+        if !judgement.can_tell {
             for side in Side::BOTH {
                 missing.lost_share.add(due[side] * (of_gap - 1.0) / of_gap, lacks[side]);
             }
         }
-        found.push(Gap { row: k, missing: of_gap.round() - 1.0, lacks, is_lost, likely_lost });
+        found.push(Gap { row: k, missing: of_gap.round() - 1.0, lacks, judgement });
     }
     (found, missing)
 }
