@@ -24,8 +24,8 @@ const MAX_WHOLE_GAP_ERROR: f64 = 0.05;
 /// The same where rows came by themselves between them, and stamps are exact: far below what stamps are off
 /// by that were restored from receipt, some tenths of a per mil.
 const MAX_EXACT_GAP_ERROR: f64 = 1e-4;
-/// Share of the sampling period by which a row that came by itself is off the tick that it counts as; one that
-/// is further off came after the tick before it.
+/// Share of the sampling period by which a row that came by itself is off the tick that it counts as; one
+/// that is further off came after the tick before it.
 const MAX_OFF_NEXT_TICK: f64 = 0.01;
 /// Share of the rows that came by themselves beside an exact beat at the most: a quarter of what the beat is
 /// told from.

@@ -112,8 +112,8 @@ impl Missing {
         self.lost_share.join(&other.lost_share);
     }
 
-    /// Whether gaps that need not tell lost their counts by what they say together, and those that tell do not
-    /// deny it.
+    /// Whether gaps that need not tell lost their counts by what they say together, and those that tell do
+    /// not deny it.
     fn all_lost_together(&self) -> bool {
         self.lost_share.are_lost() == Some(true) && self.lost >= self.kept
     }
