@@ -179,9 +179,16 @@ impl Case {
         let noise = TrueNoise::of(&conditions, &instrument_model, mean_square_motion(&plain));
         let (mut detectability, mut rounding_shares) = (Vec::new(), Vec::new());
         for effect in &mut hidden {
-            let measured = |effect: &Hidden, noise: TrueNoise, hypotheses: Hypotheses<'_>| {
-                let exact = drive(&robot.sessions, &measurement, &[effect], false, 0)?;
-                Ok(Detectability::of(&cut_into_runs(exact, &stops), &plain, &truth, noise, hypotheses))
+            // What was driven last, and at which scale: it is asked several things.
+            let mut last: Option<(f64, Vec<Dataset>)> = None;
+            let mut measured = |effect: &Hidden, noise: TrueNoise, hypotheses: Hypotheses<'_>| {
+                let driven = match last.take().filter(|(scale, _)| *scale == effect.scale) {
+                    Some((_, driven)) => driven,
+                    None => cut_into_runs(drive(&robot.sessions, &measurement, &[effect], false, 0)?, &stops),
+                };
+                let found = Detectability::of(&driven, &plain, &truth, noise, hypotheses);
+                last = Some((effect.scale, driven));
+                Ok(found)
             };
             match scale(effect, &mut draw, ratios, |effect, hypotheses| measured(effect, noise, hypotheses))? {
                 Chosen::RecordFault => detectability.push(None),
@@ -319,14 +326,13 @@ fn scale(
     effect: &mut Hidden,
     draw: &mut Draw,
     (low, high): (f64, f64),
-    measured: impl Fn(&Hidden, Hypotheses<'_>) -> Result<Option<Detectability>, ChallengeError>,
+    mut measured: impl FnMut(&Hidden, Hypotheses<'_>) -> Result<Option<Detectability>, ChallengeError>,
 ) -> Result<Chosen, ChallengeError> {
     if effect.kind == EffectKind::RecordFault {
         return Ok(Chosen::RecordFault);
     }
     effect.scale = effect.most.min(1.0);
-    let of_size = |effect: &Hidden| measured(effect, Hypotheses::One(effect.id));
-    let Some(first) = of_size(effect)? else { return Ok(Chosen::Undetectable) };
+    let Some(first) = measured(effect, Hypotheses::One(effect.id))? else { return Ok(Chosen::Undetectable) };
     let at_first = size_ratio(effect, &first);
     // The largest that a real robot may have must reach the limit, or the paths do not show the effect.
     let most = at_first * effect.most / effect.scale;
@@ -347,7 +353,7 @@ fn scale(
         if effect.act().is_none() {
             return Ok(Chosen::Undetectable);
         }
-        let Some(next) = of_size(effect)? else { return Ok(Chosen::Undetectable) };
+        let Some(next) = measured(effect, Hypotheses::One(effect.id))? else { return Ok(Chosen::Undetectable) };
         let at_next = size_ratio(effect, &next);
         if at_next.is_nan() || at_next <= 0.0 {
             return Ok(Chosen::Undetectable);

@@ -31,12 +31,22 @@ impl<'m, 'a> NullDistribution<'m, 'a> {
         (1..=RESIMULATIONS).into_par_iter().map(again).collect()
     }
 
+    /// What scans of simulated runs give, one after the other.
+    fn scanned<T: Send>(&self, of: impl Fn(&ModelFit<'_>) -> T + Sync) -> Vec<T> {
+        let fit = &self.model.fit;
+        let again = |number: u64| of(&fit.resimulated_without_pass(&mut terms(&self.model.candidates), number));
+        (1..=RESIMULATIONS).into_par_iter().map(again).collect()
+    }
+
     /// By how much the score statistics of parts are inflated; 1 where they are not.
     pub(crate) fn inflation(&self, parts: &[&[Candidate]]) -> Vec<f64> {
+        if parts.is_empty() {
+            return Vec::new();
+        }
         let scores = |fit: &ModelFit<'_>| {
             scan_parts_of(fit, &self.model.candidates, parts, |own, projected, _| ratio(own, projected))
         };
-        means(&self.resimulated(scores), parts.len())
+        means(&self.scanned(scores), parts.len())
     }
 
     /// The same of the model's own candidates at their sizes, each beside the others.

@@ -13,6 +13,7 @@ use crate::model_comparison::{form_error_statistic, log_bayes_factor, regated};
 use crate::null_distribution::NullDistribution;
 use crate::reliability::unresolved;
 use crate::scan::{Scored, scan};
+use crate::settings::findings::LACK_OF_FIT_LEVEL;
 use crate::settings::levels::SPARSE_TERM_LEVEL;
 use crate::settings::search::{MAX_SPARSE_REFITS, MAX_SPARSE_TERMS};
 use crate::statistics::{p_of_chi_square, sidak};
@@ -184,7 +185,8 @@ impl<'m, 'a> SparseSearch<'m, 'a> {
     /// The search beside a model; `None` where no term is detectable, or the best is not significant by its
     /// score at a level.
     pub(crate) fn beside(level: f64, base: &ModelFit<'a>, model: &'m AugmentedModel<'a>) -> Option<Self> {
-        let (scored, p_value) = best_first(base, model)?;
+        // No finding is asked for at a higher level.
+        let (scored, p_value) = best_first(base, model, SPARSE_TERM_LEVEL)?;
         let trials = scored.len();
         if p_value > level {
             return None;
@@ -241,13 +243,13 @@ impl<'m, 'a> SparseSearch<'m, 'a> {
 
 /// Score of the best sparse term beside a model, and its p-value; `None` where no term is detectable.
 pub(crate) fn lack_of_fit(base: &ModelFit<'_>, model: &AugmentedModel<'_>) -> Option<(f64, f64)> {
-    let (scored, p_value) = best_first(base, model)?;
+    let (scored, p_value) = best_first(base, model, LACK_OF_FIT_LEVEL)?;
     Some((scored.first()?.statistic, p_value))
 }
 
 /// Sparse terms by their scores beside a model, the best first, and its p-value; `None` where none is
-/// detectable.
-fn best_first(base: &ModelFit<'_>, model: &AugmentedModel<'_>) -> Option<(Vec<Scored>, f64)> {
+/// detectable. Coarse encoders are asked where it is significant at a level without them.
+fn best_first(base: &ModelFit<'_>, model: &AugmentedModel<'_>, level: f64) -> Option<(Vec<Scored>, f64)> {
     let library = library(base);
     let mut scored: Vec<Scored> =
         scan(&model.fit, &model.candidates, &library).into_iter().filter(|scored| scored.dimensions > 0).collect();
@@ -255,10 +257,14 @@ fn best_first(base: &ModelFit<'_>, model: &AugmentedModel<'_>) -> Option<(Vec<Sc
     let best = (2 * MAX_SPARSE_REFITS).min(scored.len());
     let unresolved = unresolved(&model.fit, &model.candidates, &scored[..best]);
     scored.retain(|scored| !unresolved.contains(&scored.candidate));
-    if let Some(null) = NullDistribution::of(model) {
+    let trials = scored.len();
+    let p_value = |scored: &[Scored]| Some(sidak(scored.first()?.p_value, trials));
+    if p_value(&scored)? <= level
+        && let Some(null) = NullDistribution::of(model)
+    {
         deflate_best(&null, &mut scored);
     }
-    let p_value = sidak(scored.first()?.p_value, scored.len());
+    let p_value = p_value(&scored)?;
     Some((scored, p_value))
 }
 

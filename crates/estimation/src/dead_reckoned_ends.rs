@@ -107,7 +107,14 @@ impl ModelFit<'_> {
         let Decimated { records, selections } = Decimated::of(&self.records, &self.selections, longest_s)?;
         let decimated = Self { records: Arc::new(records), selections: Arc::new(selections), ..self.clone() };
         let runs = decimated.scan_parts(terms, &[]);
-        let both = runs.iter().zip(&self.solution.pass.runs);
+        let scanned;
+        let own = if self.solution.pass.runs.is_empty() {
+            scanned = self.scan_parts(terms, &[]);
+            &scanned
+        } else {
+            &self.solution.pass.runs
+        };
+        let both = runs.iter().zip(own);
         let same_measurements = both.clone().all(|(run, own)| run.count == own.count);
         // A run's χ² changes by 2 Σ z δ, which has the variance 4 Σ δ².
         let squares: f64 = both.map(|(run, own)| (0.5 * (run.chi_square - own.chi_square)).powi(2)).sum();

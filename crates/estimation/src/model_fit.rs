@@ -19,8 +19,8 @@ use crate::pass_options::{OutlierGate, PassOptions};
 use crate::records::Records;
 use crate::segment::Segment;
 use crate::settings::{
-    MAX_AUTOCORRELATION_LAG, MAX_OBSERVABLE_SIGMA, MIN_CLUSTERS, MIN_NAMED_DIRECTION, MIN_OWN_DIRECTION,
-    MIN_RUNS_TO_HOLD_OUT, MIN_SPARE_CLUSTERS, ROTATED_SENSOR_RAD, WHITENESS_Z,
+    MAX_AUTOCORRELATION_LAG, MAX_NOMINAL_DEVIATION, MAX_OBSERVABLE_SIGMA, MIN_CLUSTERS, MIN_NAMED_DIRECTION,
+    MIN_OWN_DIRECTION, MIN_RUNS_TO_HOLD_OUT, MIN_SPARE_CLUSTERS, ROTATED_SENSOR_RAD, WHITENESS_Z,
 };
 use crate::stated_wheels::with_stated_wheels;
 use crate::thinning::{Selection, Thinning};
@@ -236,9 +236,9 @@ impl ModelFit<'_> {
     /// at their nominal values.
     pub(crate) fn fix_unobservable(&mut self) -> Result<(), EstimationError> {
         let Some(information) = self.solution.information(&self.columns) else { return Ok(()) };
-        let was_fixed = !self.unobservable.is_empty();
-        self.unobservable = with_stated_wheels(unobservable(&information.matrix), self.records.is_partial());
-        if self.unobservable.is_empty() {
+        let directions = with_stated_wheels(unobservable(&information.matrix), self.records.is_partial());
+        if directions.is_empty() {
+            let was_fixed = !std::mem::take(&mut self.unobservable).is_empty();
             // A direction that has become observable is free again.
             return if was_fixed { self.refit(Some(self.current_values()), &mut []) } else { Ok(()) };
         }
@@ -247,12 +247,20 @@ impl ModelFit<'_> {
         let mut model = self.solution.model.clone();
         let found = [model.m_per_rad.left, model.m_per_rad.right, model.separation_m];
         let moved = DVector::from_fn(3, |row, _| f64::ln(found[row] / nominal[row]));
-        for direction in &self.unobservable {
-            let along = direction.dot(&moved);
+        let along: Vec<f64> = directions.iter().map(|direction| direction.dot(&moved)).collect();
+        let is_fixed = |(direction, along): (&DVector<f64>, &f64)| {
+            let within: f64 = self.unobservable.iter().map(|fixed| fixed.dot(direction).powi(2)).sum();
+            within.sqrt() > MIN_NAMED_DIRECTION && along.abs() < MAX_NOMINAL_DEVIATION
+        };
+        if directions.len() == self.unobservable.len() && directions.iter().zip(&along).all(is_fixed) {
+            return Ok(());
+        }
+        for (direction, along) in directions.iter().zip(along) {
             for (column, share) in Column::GEOMETRY.into_iter().zip(direction.iter()) {
                 model.advance(column, -along * share);
             }
         }
+        self.unobservable = directions;
         let from = InitialValues { model, noise: None, free_headings: None };
         self.refit(Some(from), &mut [])
     }

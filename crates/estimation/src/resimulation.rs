@@ -17,6 +17,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use crate::model::Instrument;
 use crate::model_fit::ModelFit;
 use crate::optimizer::Solution;
+use crate::pass::Pass;
 use crate::propagation::{CarriedState, Propagator};
 use crate::rate_noise::RateNoise;
 use crate::rounding::PoseVariance;
@@ -57,6 +58,14 @@ impl ModelFit<'_> {
     /// are those of the fit.
     #[must_use]
     pub fn resimulated(&self, terms: &mut [Box<dyn ModelTerm>], number: u64) -> Self {
+        let mut again = self.resimulated_without_pass(terms, number);
+        again.solution.pass = again.scan(terms);
+        again
+    }
+
+    /// The same without a pass, for scans of candidates: no run has a normal equation.
+    #[must_use]
+    pub fn resimulated_without_pass(&self, terms: &mut [Box<dyn ModelTerm>], number: u64) -> Self {
         let mut records = self.records.copied();
         // What was measured beside the poses is of the motion that was driven, not of the one that is drawn.
         records.partial.iter_mut().filter(|of| of.has_poses()).for_each(|of| of.observations.clear());
@@ -70,7 +79,7 @@ impl ModelFit<'_> {
             count_again(segment, &smooth, &mut draws);
         }
         let mut again = Self { records: Arc::new(records), ..self.clone() };
-        again.solution.pass = again.scan(terms);
+        again.solution.pass = Pass::default();
         again
     }
 

@@ -5,8 +5,7 @@
 /// is known to a third, and a p-value of 1e-4 by Student's t needs z = 4.7 in place of 3.7.
 pub(crate) const RESIMULATIONS: u64 = 20;
 
-/// Probability. Score tests with a smaller p-value by formula are judged by simulation where encoders are
-/// coarse.
+/// Probability. Tests with a smaller p-value by formula are judged by simulation where encoders are coarse.
 /// Budgeted: what has a larger one fails no test at 1 %.
 pub(crate) const RESIMULATED_LEVEL: f64 = 0.01;
 

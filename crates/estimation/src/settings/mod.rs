@@ -243,6 +243,10 @@ pub(crate) const AUTOCORRELATION_DECAY: f64 = 0.7;
 /// Convention: nominal values are better known than this.
 pub(crate) const MAX_OBSERVABLE_SIGMA: f64 = 0.03;
 
+/// Relative. A model no farther from nominal along an unobservable direction is at nominal there.
+/// Derived: a hundredth of a thousandth of what a direction is unobservable by.
+pub(crate) const MAX_NOMINAL_DEVIATION: f64 = 3e-7;
+
 /// Runs from which on a covariance is cluster-robust although the innovations are white.
 /// Tuned: by hand; no record of what on.
 pub(crate) const MIN_CLUSTERS: usize = 20;
