@@ -1,11 +1,11 @@
 //! How a robot moved from one instant to a later one, for terms whose measurements are of another instant
-//! than their stamp says: its recorded motion where that instant is past, its speed and acceleration on
-//! where it is not recorded yet.
+//! than their stamp says: its recorded motion, and where the record ends before that instant its speed and
+//! acceleration on.
 
 use std::collections::VecDeque;
 
 use kinematics::{Increment, Pose, Twist};
-use model_term::{Interval, Measurement};
+use model_term::{Interval, Measurement, RecordedMotion};
 
 /// Motion of more is not followed back, seconds.
 pub(crate) const LONGEST_S: f64 = 1.5;
@@ -42,9 +42,20 @@ impl TimeShift {
     pub(crate) fn seen(&self, measurement: &Measurement<'_>, ago_s: f64) -> Pose {
         let ago_s = ago_s.clamp(-LONGEST_S, LONGEST_S);
         let now = (measurement.t_s, measurement.twist);
-        let moved = if ago_s > 0.0 { self.since(ago_s, now) } else { self.until(-ago_s, now) };
-        let sign = if ago_s > 0.0 { -1.0 } else { 1.0 };
-        Increment { distance_m: sign * moved.distance_m, turn_rad: sign * moved.turn_rad }.arc()
+        if ago_s > 0.0 {
+            let Increment { distance_m, turn_rad } = self.since(ago_s, now);
+            return Increment { distance_m: -distance_m, turn_rad: -turn_rad }.arc();
+        }
+        let to_s = measurement.t_s - ago_s;
+        let ahead =
+            measurement.record.between(measurement.t_s, to_s).map(|RecordedMotion { increment, until_s, twist }| {
+                let left_s = (to_s - until_s).max(0.0);
+                Increment {
+                    distance_m: increment.distance_m + left_s * twist.v_m_s,
+                    turn_rad: increment.turn_rad + left_s * twist.omega_rad_s,
+                }
+            });
+        ahead.unwrap_or_else(|| self.until(-ago_s, now)).arc()
     }
 
     /// Distance and turn from the instant `ago_s` before now on.
@@ -75,9 +86,12 @@ impl TimeShift {
         moved
     }
 
-    /// Distance and turn from now on for `time_s`, speeding up as in the last interval.
+    /// Distance and turn from now on for `time_s`, speeding up as on average for as long before: counts of
+    /// single rows say little of an acceleration.
     fn until(&self, time_s: f64, now: (f64, Twist)) -> Increment {
-        let before = self.ends.iter().rev().find(|(end_s, _)| *end_s < now.0).copied().unwrap_or(now);
+        let before_now = || self.ends.iter().copied().filter(|(end_s, _)| *end_s < now.0);
+        let as_long_ago = before_now().rev().find(|(end_s, _)| *end_s <= now.0 - time_s);
+        let before = as_long_ago.or_else(|| before_now().next()).unwrap_or(now);
         let passed_s = now.0 - before.0;
         let of = |now: f64, before: f64| {
             let acceleration = if passed_s > 0.0 { (now - before) / passed_s } else { 0.0 };
@@ -94,6 +108,7 @@ impl TimeShift {
 mod tests {
     use dataset::RunInfo;
     use kinematics::Wheels;
+    use model_term::{MotionRecord, NoRecord};
 
     use super::*;
 
@@ -124,7 +139,8 @@ mod tests {
         let (run, mut shift) = (RunInfo::default(), TimeShift::default());
         speeding_up(|interval| shift.motion(interval), &run);
         let twist = Twist { v_m_s: 1.0, omega_rad_s: 0.0 };
-        let measurement = Measurement { t_s: 1.0, world_from_body: Pose::IDENTITY, twist, run: &run };
+        let measurement =
+            Measurement { t_s: 1.0, world_from_body: Pose::IDENTITY, twist, record: &NoRecord, run: &run };
         // 0.1 s before and after t = 1 s: ∓0.1 + 0.1²/2 m. Rejects the speed at the measurement alone, ∓0.1.
         assert!((shift.seen(&measurement, 0.1).x_m + 0.095).abs() < 1e-12);
         assert!((shift.seen(&measurement, -0.1).x_m - 0.105).abs() < 1e-12);
@@ -132,5 +148,35 @@ mod tests {
         let slow = Measurement { twist: Twist { v_m_s: 0.02, omega_rad_s: 0.0 }, t_s: 0.98, ..measurement };
         shift.ends = [(0.96, Twist { v_m_s: 0.04, omega_rad_s: 0.0 })].into();
         assert!((shift.seen(&slow, -0.1).x_m - 2e-4).abs() < 1e-12);
+        // A speed that is off in the last row is no acceleration: 0.1 m/s over 0.1 s, not over 0.02 s, is
+        // 0.1 + 0.1²/2 m. Rejects the last row, 0.1 + 5 · 0.1²/2.
+        let at = |t_s: f64, v_m_s: f64| (t_s, Twist { v_m_s, omega_rad_s: 0.0 });
+        shift.ends = [at(0.88, 0.9), at(0.9, 0.9), at(0.98, 0.9)].into();
+        assert!((shift.seen(&measurement, -0.1).x_m - 0.105).abs() < 1e-12);
+    }
+
+    /// A record of 1 m/s for 40 ms after any instant.
+    #[derive(Debug)]
+    struct ShortRecord;
+
+    impl MotionRecord for ShortRecord {
+        fn between(&self, from_s: f64, to_s: f64) -> Option<RecordedMotion> {
+            let time_s = (to_s - from_s).min(0.04);
+            let increment = Increment { distance_m: time_s, turn_rad: 0.0 };
+            Some(RecordedMotion { increment, until_s: from_s + time_s, twist: Twist { v_m_s: 1.0, omega_rad_s: 0.5 } })
+        }
+    }
+
+    #[test]
+    fn regress_motion_after_a_measurement_is_taken_from_the_record() {
+        let (run, shift) = (RunInfo::default(), TimeShift::default());
+        let twist = Twist { v_m_s: 9.0, omega_rad_s: 9.0 };
+        let measurement =
+            Measurement { t_s: 1.0, world_from_body: Pose::IDENTITY, twist, record: &ShortRecord, run: &run };
+        // Rejects the speed at the measurement, which coarse counts may have wrong.
+        assert!((shift.seen(&measurement, -0.03).x_m - 0.03).abs() < 1e-12);
+        // After its end the motion goes on as it is there: 0.06 s at 1 m/s and 0.5 rad/s.
+        let beyond = Increment { distance_m: 0.1, turn_rad: 0.03 }.arc();
+        assert_eq!(shift.seen(&measurement, -0.1), beyond);
     }
 }

@@ -59,6 +59,7 @@ mod records;
 mod resimulation;
 mod rounding;
 mod segment;
+mod segment_record;
 mod settings;
 mod stated_wheels;
 #[cfg(test)]

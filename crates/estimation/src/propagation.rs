@@ -16,6 +16,7 @@ use crate::derivatives::Derivatives;
 use crate::kinematic_samples::{KinematicSample, KinematicSampler};
 use crate::model::Model;
 use crate::segment::Segment;
+use crate::segment_record::SegmentRecord;
 use crate::thinning::PropagationInterval;
 use crate::wheel_angles::WheelInterval;
 
@@ -235,8 +236,9 @@ impl<'f, 'a> Propagator<'f, 'a> {
         if let PropagationSource::Cached(cached, _) = self.propagations {
             self.gradients.copy_from_slice(cached.measurement(propagations));
         } else {
-            let measurement =
-                Measurement { t_s, world_from_body: self.run_from_chain * pose, twist, run: self.segment.info };
+            let record = SegmentRecord { intervals: &self.segment.intervals, model: self.model };
+            let world_from_body = self.run_from_chain * pose;
+            let measurement = Measurement { t_s, world_from_body, twist, record: &record, run: self.segment.info };
             self.ask_terms(|term, own| term.measurement(&measurement, own));
         }
         if let PropagationSource::Recorded(cached) = &mut self.propagations {

@@ -93,6 +93,34 @@ impl Interval<'_> {
     }
 }
 
+/// How a robot moved by the record after an instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RecordedMotion {
+    /// Motion of the drive's centre by the wheels' speeds, distance and turn.
+    pub increment: Increment,
+    /// Where it ends, seconds from the run's start: the record may end earlier than was asked.
+    pub until_s: f64,
+    /// Velocity there.
+    pub twist: Twist,
+}
+
+/// What is recorded of a run.
+pub trait MotionRecord: std::fmt::Debug {
+    /// The motion from one instant to a later one, seconds from the run's start; `None` where nothing is
+    /// recorded after the first.
+    fn between(&self, from_s: f64, to_s: f64) -> Option<RecordedMotion>;
+}
+
+/// A run of which nothing is recorded beside a measurement.
+#[derive(Debug, Clone, Copy)]
+pub struct NoRecord;
+
+impl MotionRecord for NoRecord {
+    fn between(&self, _from_s: f64, _to_s: f64) -> Option<RecordedMotion> {
+        None
+    }
+}
+
 /// One measurement of the outside instrument.
 #[derive(Debug, Clone, Copy)]
 pub struct Measurement<'r> {
@@ -102,6 +130,8 @@ pub struct Measurement<'r> {
     pub world_from_body: Pose,
     /// How it moved then, by the counts of as many rows before as after.
     pub twist: Twist,
+    /// What is recorded around it, for terms by which it was of another instant.
+    pub record: &'r dyn MotionRecord,
     /// The run.
     pub run: &'r RunInfo,
 }

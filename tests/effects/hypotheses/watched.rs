@@ -4,7 +4,7 @@
 use dataset::{Dataset, Protocol, ProtocolSettings, Run, WheelLog};
 use effects::Forward;
 use kinematics::{Increment, Pose, Twist, Wheels};
-use model_term::{Interval, Measurement, ModelTerm};
+use model_term::{Interval, Measurement, ModelTerm, NoRecord};
 use motion_programs::{Motion, MotionProgram, Platform};
 use scenario::{Engine, Instrument, Log, Scenario};
 use sim_yair::SimulatedRobot;
@@ -128,7 +128,10 @@ pub(crate) fn missed(dataset: &Dataset, term: &mut dyn ModelTerm, values: &[f64]
         let mut gradient = vec![Pose::IDENTITY; values.len()];
         let sighted = |term: &mut dyn ModelTerm, t_s, world_from_body, twist| {
             let mut gradient = vec![Pose::IDENTITY; values.len()];
-            term.measurement(&Measurement { t_s, world_from_body, twist, run: &run.info }, &mut gradient);
+            term.measurement(
+                &Measurement { t_s, world_from_body, twist, record: &NoRecord, run: &run.info },
+                &mut gradient,
+            );
             sum(&gradient, values)
         };
         let seen = |k: usize| {

@@ -126,6 +126,7 @@ impl ModelTerm for Term {
 mod tests {
     use super::*;
     use kinematics::Wheels;
+    use model_term::NoRecord;
 
     #[test]
     fn clocks_run_on_from_the_start_of_the_run_or_of_the_session() {
@@ -134,6 +135,7 @@ mod tests {
             t_s: 2.0,
             world_from_body: Pose::IDENTITY,
             twist: Twist { v_m_s: 0.5, omega_rad_s: 0.1 },
+            record: &NoRecord,
             run: &run,
         };
         let seen = |of_session: bool| {

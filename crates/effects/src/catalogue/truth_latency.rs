@@ -115,6 +115,8 @@ impl ModelTerm for Term {
 
 #[cfg(test)]
 mod tests {
+    use model_term::NoRecord;
+
     use super::*;
 
     #[test]
@@ -125,7 +127,9 @@ mod tests {
         assert_eq!(reading, PoseReading { t_s: 1.05, world_from_body: Pose::IDENTITY });
         let (run, twist) = (RunInfo::default(), Twist { v_m_s: 0.4, omega_rad_s: -0.2 });
         let mut gradient = [Pose::IDENTITY];
-        Term::default().measurement(&Measurement { t_s: 1.05, world_from_body: Pose::IDENTITY, twist, run: &run }, &mut gradient);
+        let measurement =
+            Measurement { t_s: 1.05, world_from_body: Pose::IDENTITY, twist, record: &NoRecord, run: &run };
+        Term::default().measurement(&measurement, &mut gradient);
         assert_eq!(gradient, [Pose::new(-0.4, 0.0, 0.2)]);
     }
 }
