@@ -323,7 +323,13 @@ impl Gain {
         self.drifts_more_by(1.0)
     }
 
-    /// The same at so many half-widths of the 95 % interval.
+    /// Whether held-out measurements are no likelier under the extended model.
+    pub(crate) fn predicts_worse(&self) -> bool {
+        let score = self.log_score_per_observation;
+        score.low + score.high <= 0.0
+    }
+
+    /// Whether odometry drifts more at so many half-widths of the 95 % interval.
     pub(crate) fn drifts_more_by(&self, half_widths: f64) -> bool {
         self.drift_percent.as_ref().is_some_and(|drift| {
             let (mean, half_width) = (0.5 * (drift.low + drift.high), 0.5 * (drift.high - drift.low));

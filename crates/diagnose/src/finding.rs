@@ -207,9 +207,13 @@ pub(crate) fn of_failed_checks(
     let worst = least(&mut checked.checks.iter().filter(|test| test.shows_dependence()))
         .or_else(|| least(&mut checked.checks.iter().filter(|test| !test.passes)));
     let worst = worst.filter(|_| !failed.is_empty())?;
-    // Residuals that are correlated with the ones before them, and with nothing that was recorded, may be
-    // errors of the instrument that last.
-    let only_correlated = failed.iter().all(|check| matches!(check, Check::Whiteness(_)));
+    // Residuals that are correlated with the ones before them may be errors of the instrument that last. Such
+    // errors are not independent as tests of dependence take them to be, which fail too then, if less plainly.
+    let is_whiteness = |test: &&TestResult| matches!(test.check, Check::Whiteness(_));
+    let of_correlation = least(&mut checked.checks.iter().filter(is_whiteness)).unwrap_or(1.0);
+    let may_be_correlation =
+        |test: &TestResult| is_whiteness(&test) || (test.shows_dependence() && test.p_value >= of_correlation);
+    let only_correlated = checked.checks.iter().filter(|test| !test.passes).all(may_be_correlation);
     let sign = only_correlated.then_some(Sign::AutocorrelatedErrors);
     let errors = sign.into_iter().flat_map(|sign| with_sign(sign, without)).map(Cause::Effect);
     let of_dependence = checked.checks.iter().any(TestResult::shows_dependence);

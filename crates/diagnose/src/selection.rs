@@ -170,7 +170,9 @@ fn confirm(
     level: f64,
 ) -> Result<(), Refusal> {
     // A size that the refit does not confirm was an accident of the score.
-    if deflated_p_value(without, extended, index).is_none_or(|p_value| p_value * tests > level) {
+    let confirms = |p_value: Option<f64>| p_value.is_some_and(|p_value| p_value * tests <= level);
+    // Coarse encoders make no size more significant.
+    if !(confirms(p_value_over(extended, index, 1.0)) && confirms(deflated_p_value(without, extended, index))) {
         return Err(Refusal::NotConfirmed);
     }
     // Nor is an effect of a few runs. Where turns scatter from run to run, everything correlated with turns
@@ -249,8 +251,7 @@ pub(crate) fn search<'a>(
         // A term that predicts held-out runs worse, or with which odometry drifts significantly more, is
         // refused. It is tested beside the others: alone, a part of a larger effect may predict worse.
         let refusal = gain(&without, &found[0].1).ok().and_then(|gain| {
-            let score = gain.log_score_per_observation;
-            if score.low + score.high <= 0.0 {
+            if gain.predicts_worse() {
                 return Some(Refusal::PredictsWorse);
             }
             gain.drifts_more_by(MAX_DRIFT_INCREASE_INTERVALS).then_some(Refusal::DriftsMore)
@@ -312,7 +313,7 @@ pub(crate) fn search_ungated<'a>(
     let trials = tests_in(&bold.first_scan);
     let is_significant = tests.iter().all(|test| test.p_value * trials <= SCAN_LEVEL);
     let predicts = gain(&AugmentedModel::base(base), &model)
-        .map_or(true, |gain| !gain.drifts_more_by(MAX_DRIFT_INCREASE_INTERVALS));
+        .map_or(true, |gain| !gain.predicts_worse() && !gain.drifts_more_by(MAX_DRIFT_INCREASE_INTERVALS));
     (is_significant && predicts).then(|| SearchResult {
         model,
         tests,

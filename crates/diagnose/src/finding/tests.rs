@@ -171,6 +171,19 @@ fn failed_checks_are_as_significant_as_the_dependence_that_they_show() {
 }
 
 #[test]
+fn regress_errors_that_last_may_show_as_a_dependence_that_is_less_plain_than_their_correlation() {
+    use crate::check::Component;
+    let of = |white: f64, speed: f64| {
+        let checks =
+            [(Check::Whiteness(Component::Across), white, false), (Check::Covariate("speed".to_owned()), speed, false)];
+        of_failed_checks(&checked(&checks), &[], [].into_iter()).expect("both fail").causes
+    };
+    assert_eq!(of(1e-8, 1e-6), [Cause::Unknown, Cause::Effect("truth_correlated_noise")]);
+    // A dependence that is plainer than the correlation is not made by it.
+    assert_eq!(of(1e-6, 1e-8), [Cause::Unknown]);
+}
+
+#[test]
 fn effects_with_a_sign_are_named_unless_they_are_taken_out() {
     let all = with_sign(Sign::AutocorrelatedErrors, &[]);
     assert_eq!(all, ["truth_correlated_noise"]);
