@@ -207,8 +207,8 @@ pub(crate) fn of_failed_checks(
     let worst = least(&mut checked.checks.iter().filter(|test| test.shows_dependence()))
         .or_else(|| least(&mut checked.checks.iter().filter(|test| !test.passes)));
     let worst = worst.filter(|_| !failed.is_empty())?;
-    // Residuals that are correlated with the ones before them may be errors of the instrument that last. Such
-    // errors are not independent as tests of dependence take them to be, which fail too then, if less plainly.
+    // Residuals that are correlated with the ones before them may be errors of the instrument that last.
+    // Tests of dependence take errors to be independent, and fail too then, if less plainly.
     let is_whiteness = |test: &&TestResult| matches!(test.check, Check::Whiteness(_));
     let of_correlation = least(&mut checked.checks.iter().filter(is_whiteness)).unwrap_or(1.0);
     let may_be_correlation =

@@ -1,4 +1,4 @@
-//! Cache of the scans and fits that were made on one base.
+//! Cache of the scans, fits and simulated distributions that were made on one base.
 
 use std::sync::Arc;
 
@@ -6,6 +6,7 @@ use estimation::ModelFit;
 
 use crate::augmented_model::{AugmentedModel, others, refit, without};
 use crate::candidate::Candidate;
+use crate::null_distribution::NullDistribution;
 use crate::reliability::unresolved;
 use crate::scan::{Scored, scan};
 
@@ -14,6 +15,9 @@ use crate::scan::{Scored, scan};
 pub(crate) struct FitCache<'a> {
     scans: Vec<(Vec<Candidate>, Vec<Scored>)>,
     fits: Vec<Arc<AugmentedModel<'a>>>,
+    /// Of candidates beside models: the model's candidates, the candidate, and by how much coarse encoders
+    /// inflate its statistic.
+    inflations: Vec<(Vec<Candidate>, Candidate, f64)>,
     /// What the encoders do not resolve, by the first scan.
     unresolved: Option<Vec<Candidate>>,
 }
@@ -63,6 +67,27 @@ impl<'a> FitCache<'a> {
         let fit = self.fit(&candidates).cloned().or_else(|| refit(base, from, candidates))?;
         self.keep(&fit);
         Some(fit)
+    }
+
+    /// By how much coarse encoders inflate the statistics of candidates beside a model; 1 where formulas hold.
+    pub(crate) fn inflation_of_each(&mut self, without: &AugmentedModel<'_>, candidates: &[Candidate]) -> Vec<f64> {
+        let Some(null) = NullDistribution::of(without) else { return vec![1.0; candidates.len()] };
+        let is_of = |known: &(Vec<Candidate>, Candidate, f64), candidate: &Candidate| {
+            known.1 == *candidate && known.0 == without.candidates
+        };
+        let is_new = |candidate: &&Candidate| !self.inflations.iter().any(|known| is_of(known, candidate));
+        let new: Vec<&[Candidate]> = candidates.iter().filter(is_new).map(std::slice::from_ref).collect();
+        let found = null.inflation(&new);
+        let found =
+            new.iter().zip(found).map(|(own, inflation)| (without.candidates.clone(), own[0].clone(), inflation));
+        self.inflations.extend(found);
+        let of = |candidate: &Candidate| self.inflations.iter().find(|known| is_of(known, candidate));
+        candidates.iter().map(|candidate| of(candidate).map_or(1.0, |known| known.2)).collect()
+    }
+
+    /// The same of one candidate.
+    pub(crate) fn inflation_of(&mut self, without: &AugmentedModel<'_>, candidate: &Candidate) -> f64 {
+        self.inflation_of_each(without, std::slice::from_ref(candidate)).first().copied().unwrap_or(1.0)
     }
 
     pub(crate) fn keep(&mut self, model: &AugmentedModel<'a>) {

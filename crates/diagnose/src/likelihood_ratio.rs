@@ -12,7 +12,6 @@ use estimation::ModelFit;
 
 use crate::augmented_model::{AugmentedModel, cost, count};
 use crate::fit_cache::FitCache;
-use crate::null_distribution::NullDistribution;
 use crate::ranking::Entry;
 use crate::settings::search::{MAX_REFITTED_BY_SCORE, REFITTED_LEVEL};
 use crate::statistics::{p_of_ratio, sidak};
@@ -33,7 +32,8 @@ pub(crate) fn significant_once_refitted<'e, 'a>(
         let mut candidates = model.candidates.clone();
         candidates.push(entry.scored.candidate.clone());
         let refitted = known.refitted(base, model, candidates)?;
-        Some((entry, sidak(p_value(model, &refitted, entry, level / tests)?, entry.variants.max(1))))
+        let p_value = p_value((model, &mut *known), &refitted, entry, level / tests)?;
+        Some((entry, sidak(p_value, entry.variants.max(1))))
     };
     let tested = ranked.into_iter().filter_map(p_value_of);
     let (best, p_value) = tested.min_by(|a, b| a.1.total_cmp(&b.1))?;
@@ -42,7 +42,12 @@ pub(crate) fn significant_once_refitted<'e, 'a>(
 
 /// The p-value of an entry's refit beside the model without it. Coarse encoders are asked where it is
 /// significant without them.
-fn p_value(model: &AugmentedModel<'_>, refitted: &AugmentedModel<'_>, entry: &Entry, level: f64) -> Option<f64> {
+fn p_value(
+    (model, known): (&AugmentedModel<'_>, &mut FitCache<'_>),
+    refitted: &AugmentedModel<'_>,
+    entry: &Entry,
+    level: f64,
+) -> Option<f64> {
     let scored = &entry.scored;
     let most = count(&model.fit).max(count(&refitted.fit));
     let (wald, _) = wald_test(refitted, model.candidates.len())?;
@@ -53,7 +58,7 @@ fn p_value(model: &AugmentedModel<'_>, refitted: &AugmentedModel<'_>, entry: &En
     if p_value > level {
         return Some(p_value);
     }
-    Some(NullDistribution::of(model).map_or(p_value, |null| over(null.inflation_of(&scored.candidate))))
+    Some(over(known.inflation_of(model, &scored.candidate)))
 }
 
 #[cfg(test)]

@@ -63,11 +63,6 @@ impl<'m, 'a> NullDistribution<'m, 'a> {
         };
         means(&self.resimulated(scores), self.model.candidates.len())
     }
-
-    /// The same for one candidate.
-    pub(crate) fn inflation_of(&self, candidate: &Candidate) -> f64 {
-        self.inflation(&[std::slice::from_ref(candidate)]).first().copied().unwrap_or(1.0)
-    }
 }
 
 /// A score statistic over what it is by formula, on average.

@@ -11,7 +11,6 @@ use crate::candidate::Candidate;
 use crate::fit_cache::FitCache;
 use crate::geometry_deviations::keeps_wheels;
 use crate::model_comparison::{log_odds_margin, occam_factor, relative_odds};
-use crate::null_distribution::NullDistribution;
 use crate::physical::{is_physical, is_plausible};
 use crate::ranking::Entry;
 use crate::settings::search::{
@@ -121,8 +120,10 @@ pub(crate) fn rivals<'a>(
         likelier => likelier,
     };
     // Causes are compared on the same data: what coarse encoders inflate of the one that explains most, they
-    // inflate of all. By its own inflation each, one that explains less might come first.
-    let of_each = inflation_of_each(without, index, &fits);
+    // inflate of all. By its own inflation each, one that explains less might come first. Log likelihoods of
+    // dependent errors are as much too large (Pace, Salvan & Sartori 2011).
+    let added: Vec<Candidate> = fits.iter().map(|extended| extended.candidates[index].clone()).collect();
+    let of_each = known.inflation_of_each(without, &added);
     let of_best = fits.iter().zip(&of_each).max_by(|a, b| explained(a.0).total_cmp(&explained(b.0)));
     let common = of_best.map_or(1.0, |(_, inflation)| *inflation);
     let mut named: Vec<(Name, AugmentedModel<'a>)> = fits
@@ -151,15 +152,6 @@ pub(crate) fn rivals<'a>(
         name.outdone = best > name.log_odds + log_odds_margin(name.log_odds);
     }
     named
-}
-
-/// By how much coarse encoders inflate what models explain by their candidate at an index, beside the model
-/// without it; 1 where formulas hold. Log likelihoods of dependent errors are as much too large (Pace, Salvan
-/// & Sartori 2011).
-fn inflation_of_each(without: &AugmentedModel<'_>, index: usize, fits: &[AugmentedModel<'_>]) -> Vec<f64> {
-    let candidates: Vec<Candidate> = fits.iter().map(|extended| extended.candidates[index].clone()).collect();
-    let parts: Vec<&[Candidate]> = candidates.chunks(1).collect();
-    NullDistribution::of(without).map_or_else(|| vec![1.0; fits.len()], |null| null.inflation(&parts))
 }
 
 /// The score statistic from which on a candidate is a close rival of the best.

@@ -18,7 +18,7 @@ use crate::run_to_run::differs_from_run_to_run;
 use crate::settings::levels::{CLUSTER_ROBUST_LEVEL, MAX_EFFECTS, SCAN_LEVEL, TURN_SCATTER_LEVEL};
 use crate::settings::search::{MAX_CANCELLATION, MAX_CANDIDATES_TRIED, MAX_DRIFT_INCREASE_INTERVALS};
 use crate::statistics::sidak;
-use crate::wald::{Test, cluster_robust_test, deflated_p_value, p_value_over, tests_of, wald_test};
+use crate::wald::{Test, cluster_robust_test, p_value_over, tests_of, wald_test};
 
 /// What the search found.
 #[derive(Debug, Clone)]
@@ -61,7 +61,7 @@ fn grown<'a>(
         let (id, statistic) = (best.scored.candidate.id(), best.scored.statistic);
         let found = rivals((base, &mut *known), model, index, &entries, statistic, refusals);
         let refuted = match found.into_iter().next().filter(|(name, _)| name.log_odds > 0.0) {
-            Some((name, extended)) => match confirm(model, &extended, index, tests, level) {
+            Some((name, extended)) => match confirm((model, &mut *known), &extended, index, tests, level) {
                 Ok(()) => return Some(extended),
                 Err(refusal) => {
                     refusals.insert(name.candidate.id(), refusal);
@@ -163,16 +163,17 @@ fn largest_part(
 
 /// Whether a refit confirms what a score says of a candidate, or why not.
 fn confirm(
-    without: &AugmentedModel<'_>,
+    (without, known): (&AugmentedModel<'_>, &mut FitCache<'_>),
     extended: &AugmentedModel<'_>,
     index: usize,
     tests: f64,
     level: f64,
 ) -> Result<(), Refusal> {
     // A size that the refit does not confirm was an accident of the score.
-    let confirms = |p_value: Option<f64>| p_value.is_some_and(|p_value| p_value * tests <= level);
+    let confirms =
+        |inflation: f64| p_value_over(extended, index, inflation).is_some_and(|p_value| p_value * tests <= level);
     // Coarse encoders make no size more significant.
-    if !(confirms(p_value_over(extended, index, 1.0)) && confirms(deflated_p_value(without, extended, index))) {
+    if !(confirms(1.0) && confirms(known.inflation_of(without, &extended.candidates[index]))) {
         return Err(Refusal::NotConfirmed);
     }
     // Nor is an effect of a few runs. Where turns scatter from run to run, everything correlated with turns

@@ -27,7 +27,7 @@ use crate::selection::{search, search_ungated};
 use crate::settings::levels::SCAN_LEVEL;
 use crate::small_robot::{assert_unmoved, effect, fitted, session, with_effects};
 use crate::sparse_terms::{SparseSearch, lack_of_fit};
-use crate::wald::{cluster_robust_test, deflated_p_value, tests_of};
+use crate::wald::{cluster_robust_test, p_value_over, tests_of};
 
 /// A robot whose right wheel seems larger in every other run, so that runs differ.
 fn differing() -> Dataset {
@@ -73,7 +73,8 @@ fn asked(datasets: &[Dataset]) -> String {
     line("form", &[form_error_statistic(&model), form_error_statistic(&of_latency)]);
     line("tests", &tests_of(&model, &[vec![0.0], vec![0.01]]));
     line("over runs", &[0.9, 0.05, 1e-6].map(|level| [0, 1].map(|of| cluster_robust_test(&model, of, level))));
-    line("deflated", &deflated_p_value(&of_latency, &model, 0));
+    let inflation = FitCache::default().inflation_of(&of_latency, &model.candidates[0]);
+    line("deflated", &p_value_over(&model, 0, inflation));
     line("wheels", &[keeps_wheels(&base, &model.fit), keeps_wheels(&model.fit, &base)]);
     line("deviations", &remaining_deviations(&base, &model));
     line("possible", &[is_physical(&model, 0), is_physical(&model, 1)]);
@@ -133,7 +134,11 @@ fn regress_no_number_of_coarse_encoders_moves() {
     let parts = [effect("slip_speed"), effect("castor_drag")];
     let inflation = null.inflation(&[&parts[..1], &parts[..]]);
     // No test is made stricter than by formula, and a part for itself is inflated as among others.
-    assert!(inflation.iter().all(|of| *of >= 1.0) && null.inflation_of(&parts[0]) == inflation[0]);
+    let mut known = FitCache::default();
+    assert!(inflation.iter().all(|of| *of >= 1.0) && known.inflation_of(&alone, &parts[0]) == inflation[0]);
+    // One that is known already, and one that is not, in their order.
+    let castor = known.inflation_of_each(&alone, &[parts[1].clone(), parts[0].clone()]);
+    assert_eq!(castor, [null.inflation(&[&parts[1..]])[0], inflation[0]]);
     assert_unmoved("null_distribution.txt", &format!("{inflation:?}\n"));
     assert!(NullDistribution::of(&AugmentedModel::base(&fitted(&[ticking(1e6)]))).is_none());
 }

@@ -56,17 +56,7 @@ fn wald_test_of(
     (test, directions)
 }
 
-/// The p-value of a candidate where coarse encoders inflate its statistic, beside the model without it.
-pub(crate) fn deflated_p_value(
-    without: &AugmentedModel<'_>,
-    extended: &AugmentedModel<'_>,
-    candidate: usize,
-) -> Option<f64> {
-    let inflation = NullDistribution::of(without).map(|null| null.inflation_of(&extended.candidates[candidate]));
-    p_value_over(extended, candidate, inflation.unwrap_or(1.0))
-}
-
-/// The same where the inflation is known.
+/// The p-value of a candidate whose statistic coarse encoders inflate by so much.
 pub(crate) fn p_value_over(extended: &AugmentedModel<'_>, candidate: usize, inflation: f64) -> Option<f64> {
     let (test, directions) = wald_test(extended, candidate)?;
     let equations = total(&extended.fit.solution.pass.runs)?;

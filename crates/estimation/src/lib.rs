@@ -62,6 +62,7 @@ mod segment;
 mod segment_record;
 mod settings;
 mod stated_wheels;
+mod step_control;
 #[cfg(test)]
 mod tests;
 mod thinned_fit;

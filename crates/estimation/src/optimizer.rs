@@ -20,8 +20,8 @@ use crate::settings::{
     HEADING_STEP_TOLERANCE_RAD, LEFT_BASIN_STEP, MAX_FIT_STEPS, MAX_GEOMETRY_STEP, MAX_NOISE_SCALING, MAX_NOISE_STEP,
     MAX_UNGATED_STEPS, MEAN_COST_TOLERANCE, MEAN_STEP_TOLERANCE, MIN_NOISE_SIGMA, MIN_UNGATED_STEPS,
     NOISE_COST_TOLERANCE, NOISE_STEP_TOLERANCE, RELATIVE_DAMPING, REUSE_TOLERANCE, START_HEADING_BASELINE_M,
-    STEP_DECREASE, STEP_INCREASE,
 };
+use crate::step_control::{Progress, StepDamping};
 use crate::thinning::Selection;
 
 /// When the steps of a fit have converged.
@@ -193,6 +193,7 @@ pub(crate) fn fit_from(
     let mut moved_since_cached = 0.0;
     // Whether the last step hardly changed the likelihood: a variance near 0 may wander on for ever.
     let mut is_near = false;
+    let mut progress = Progress::default();
     for _ in 0..options.max_steps {
         let by_cached = PassOptions { keep: keep && cached.is_none(), by: cached.as_ref(), ..pass_options };
         let mut found = pass(records, selections, &model, &noise, &headings, terms, by_cached);
@@ -224,6 +225,9 @@ pub(crate) fn fit_from(
         };
         if settles && (cached.is_none() || moved_since_cached < REUSE_TOLERANCE) {
             (converged, cached) = (true, cached.or(found.cached.take()));
+            break;
+        }
+        if options.ends == ConvergenceCriterion::Likelihood && progress.has_stalled(moved + of_noise.squared()) {
             break;
         }
         cached = if settles { None } else { cached.or(found.cached.take()).filter(|_| moved < CACHED_STEP) };
@@ -390,35 +394,6 @@ impl NoiseStep {
     /// Squared length over its variance.
     fn squared(&self) -> f64 {
         self.by.dot(&(self.information * self.by))
-    }
-}
-
-/// Share of its scoring step that the logarithm of each variance takes: scoring overshoots where the model is
-/// wrong, and shorter steps converge.
-#[derive(Debug, Clone, Copy)]
-struct StepDamping {
-    last: Vector4<f64>,
-    share: Vector4<f64>,
-}
-
-impl Default for StepDamping {
-    fn default() -> Self {
-        Self { last: Vector4::zeros(), share: Vector4::repeat(1.0) }
-    }
-}
-
-impl StepDamping {
-    /// The step to take instead of `step`.
-    fn damped(&mut self, step: Vector4<f64>) -> Vector4<f64> {
-        for k in 0..step.len() {
-            self.share[k] = if step[k] * self.last[k] < 0.0 {
-                STEP_DECREASE * self.share[k]
-            } else {
-                (STEP_INCREASE * self.share[k]).min(1.0)
-            };
-        }
-        self.last = step;
-        step.component_mul(&self.share)
     }
 }
 

@@ -104,23 +104,6 @@ fn headings_follow_the_instruments_of_their_own_runs() {
 }
 
 #[test]
-fn a_damped_noise_step_is_shorter_where_it_turns_back_and_longer_where_it_goes_on() {
-    let mut damping = StepDamping::default();
-    let ahead = Vector4::new(1.0, 2.0, -3.0, 0.0);
-    // From a whole step on nothing grows.
-    assert_eq!(damping.damped(ahead), ahead);
-    let turned = damping.damped(Vector4::new(-1.0, 2.0, 3.0, 5.0));
-    assert_eq!(turned, Vector4::new(-STEP_DECREASE, 2.0, 3.0 * STEP_DECREASE, 5.0));
-    let again = damping.damped(Vector4::new(-1.0, -2.0, 3.0, 5.0));
-    let grown = (STEP_INCREASE * STEP_DECREASE).min(1.0);
-    assert_eq!(again, Vector4::new(-grown, -2.0 * STEP_DECREASE, 3.0 * grown, 5.0));
-    // Back once more: it shrinks each time.
-    let [twice, grown_twice] = [STEP_DECREASE * STEP_DECREASE, (STEP_INCREASE * grown).min(1.0)];
-    let back = damping.damped(Vector4::new(-1.0, 2.0, 3.0, 5.0));
-    assert_eq!(back, Vector4::new(-grown_twice, 2.0 * twice, 3.0 * grown_twice, 5.0));
-}
-
-#[test]
 fn a_noise_step_is_cut_as_a_whole_and_ends_at_the_least_noise() {
     let least = MIN_NOISE_SIGMA * MIN_NOISE_SIGMA;
     let of = |variance: [f64; 4], by: [f64; 4]| {
