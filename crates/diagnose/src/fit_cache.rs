@@ -69,7 +69,8 @@ impl<'a> FitCache<'a> {
         Some(fit)
     }
 
-    /// By how much coarse encoders inflate the statistics of candidates beside a model; 1 where formulas hold.
+    /// By how much coarse encoders inflate the statistics of candidates beside a model; 1 where formulas
+    /// hold.
     pub(crate) fn inflation_of_each(&mut self, without: &AugmentedModel<'_>, candidates: &[Candidate]) -> Vec<f64> {
         let Some(null) = NullDistribution::of(without) else { return vec![1.0; candidates.len()] };
         let is_of = |known: &(Vec<Candidate>, Candidate, f64), candidate: &Candidate| {
