@@ -13,13 +13,16 @@
 
 /// Cells of the grid in a beat.
 const CELLS: i64 = 8;
-/// Shares of rows that are lost, or, below zero, that came between two ticks: of these the likeliest.
-const LOST: [f64; 22] = [
-    -0.08, -0.06, -0.05, -0.04, -0.03, -0.02, -0.01, -5e-3, -2.5e-3, 0.0, 2.5e-3, 5e-3, 1e-2, 1.5e-2, 2e-2, 2.5e-2,
-    3e-2, 3.5e-2, 4e-2, 5e-2, 6e-2, 8e-2,
-];
+/// Step of the shares of rows that are lost, or, below zero, that came between two ticks, of which the
+/// likeliest is sought at first: half a beat of 500 rows. Between two steps the likelihood may have a peak of
+/// its own.
+const LOST_STEP: f64 = 1e-3;
+/// Steps of either sign that are all tried; beyond them every fifth is.
+const OFTEN_LOST: i32 = 20;
+/// Most steps of either sign.
+const MOST_LOST: i32 = 80;
 /// Steps in which the share is then sought: at first half of those above, and at the least.
-const LOST_STEPS: [f64; 2] = [1.25e-3, 3e-4];
+const LOST_STEPS: [f64; 2] = [5e-4, 1.5e-4];
 /// Log odds against rows that are lost or came between ticks at all.
 const LOST_COST: f64 = 8.0;
 /// Mean of the share of rows that are lost, which falls off exponentially: where delays are beats long, rows
@@ -280,8 +283,10 @@ impl Received {
             let cost = if lost == 0.0 { 0.0 } else { LOST_COST + lost.abs() / USUAL_LOST };
             Delays::of(mean, lost).blocks(&rows(lost, most)).0 + by_themselves * (1.0 + lost).ln() - cost
         };
-        let odds = LOST.map(|lost| (lost, log_odds(lost)));
-        let lost = odds.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0.0, |(lost, _)| lost);
+        let is_tried = |steps: &i32| steps.abs() <= OFTEN_LOST || steps % 5 == 0;
+        let shares = (-MOST_LOST..=MOST_LOST).filter(is_tried).map(|steps| LOST_STEP * f64::from(steps));
+        let lost =
+            shares.map(|lost| (lost, log_odds(lost))).max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0.0, |(lost, _)| lost);
         let lost = likeliest(lost, LOST_STEPS, log_odds);
         let (all, period_s) = (rows(lost, t_s.len()), gap_s / (1.0 + lost));
         let mean = likeliest_mean(mean, lost, &rows(lost, most));
@@ -400,7 +405,7 @@ mod tests {
         assert!(mean.abs() < 0.1 && sigma < 0.25, "{mean} ± {sigma}");
         let found = found(&rows);
         assert!((found.period_s / PERIOD_S - 1.0).abs() < 1e-3, "{}", found.period_s);
-        // The share of lost rows is found in steps of 3e-4: a beat of 4000.
+        // The share of lost rows is found in steps of 1.5e-4: half a beat of 4000.
         assert!(found.numbers().last().is_some_and(|last| (last - 3999).abs() <= 1));
     }
 
