@@ -18,9 +18,9 @@ const CELLS: i64 = 8;
 /// its own.
 const LOST_STEP: f64 = 1e-3;
 /// Steps of either sign that are all tried; beyond them every fifth is.
-const OFTEN_LOST: i32 = 20;
+const MAX_FINE_STEPS: i32 = 20;
 /// Most steps of either sign.
-const MOST_LOST: i32 = 80;
+const MAX_LOST_STEPS: i32 = 80;
 /// Steps in which the share is then sought: at first half of those above, and at the least.
 const LOST_STEPS: [f64; 2] = [5e-4, 1.5e-4];
 /// Log odds against rows that are lost or came between ticks at all.
@@ -283,8 +283,8 @@ impl Received {
             let cost = if lost == 0.0 { 0.0 } else { LOST_COST + lost.abs() / USUAL_LOST };
             Delays::of(mean, lost).blocks(&rows(lost, most)).0 + by_themselves * (1.0 + lost).ln() - cost
         };
-        let is_tried = |steps: &i32| steps.abs() <= OFTEN_LOST || steps % 5 == 0;
-        let shares = (-MOST_LOST..=MOST_LOST).filter(is_tried).map(|steps| LOST_STEP * f64::from(steps));
+        let is_tried = |steps: &i32| steps.abs() <= MAX_FINE_STEPS || steps % 5 == 0;
+        let shares = (-MAX_LOST_STEPS..=MAX_LOST_STEPS).filter(is_tried).map(|steps| LOST_STEP * f64::from(steps));
         let lost =
             shares.map(|lost| (lost, log_odds(lost))).max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0.0, |(lost, _)| lost);
         let lost = likeliest(lost, LOST_STEPS, log_odds);

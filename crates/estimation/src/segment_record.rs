@@ -22,7 +22,7 @@ impl MotionRecord for SegmentRecord<'_> {
         for interval in self.intervals[first..].iter().take_while(|interval| interval.t_s < to_s) {
             let [start, end] = interval.rate_at_ends_rad_s;
             let rate_at = |t_s: f64| {
-                let share = (t_s - interval.t_s) / interval.dt_s;
+                let share = if interval.dt_s > 0.0 { (t_s - interval.t_s) / interval.dt_s } else { 1.0 };
                 start.zip_with(end, |start, end| start + share * (end - start))
             };
             let (a_s, b_s) = (from_s.max(interval.t_s), to_s.min(interval.t_s + interval.dt_s));
@@ -47,10 +47,11 @@ mod tests {
     use crate::tests::dataset_of;
 
     /// Two rows of half a second: both wheels from 1 to 3 rad/s, then 3 rad/s, the left one back to 1.
+    /// Between them one of no length.
     fn rows() -> Vec<WheelInterval> {
-        let of = |t_s: f64, rate_at_ends_rad_s: [Wheels<f64>; 2]| WheelInterval {
+        let of = |t_s: f64, dt_s: f64, rate_at_ends_rad_s: [Wheels<f64>; 2]| WheelInterval {
             t_s,
-            dt_s: 0.5,
+            dt_s,
             wheel_rad: Wheels::both(0.0), // turns by counts, which are rounded, are not asked
             late_s: [0.0; 2],
             rate_rad_s: Wheels::both(0.0),
@@ -61,7 +62,8 @@ mod tests {
             interpolated_rad2: [Wheels::both(0.0); 2],
         };
         let (slow, fast) = (Wheels::both(1.0), Wheels::both(3.0));
-        vec![of(0.0, [slow, fast]), of(0.5, [fast, Wheels { left: 1.0, right: 3.0 }])]
+        let last = [fast, Wheels { left: 1.0, right: 3.0 }];
+        vec![of(0.0, 0.5, [slow, fast]), of(0.5, 0.0, [fast, fast]), of(0.5, 0.5, last)]
     }
 
     #[test]
