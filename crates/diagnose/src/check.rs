@@ -53,6 +53,11 @@ impl Check {
         matches!(self, Self::Covariate(_))
     }
 
+    /// Whether it asks for autocorrelation.
+    pub(crate) const fn is_of_whiteness(&self) -> bool {
+        matches!(self, Self::Whiteness(_))
+    }
+
     /// Its key in JSON.
     pub(crate) fn name(&self) -> String {
         match self {

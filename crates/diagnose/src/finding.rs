@@ -209,10 +209,9 @@ pub(crate) fn of_failed_checks(
     let worst = worst.filter(|_| !failed.is_empty())?;
     // Residuals that are correlated with the ones before them may be errors of the instrument that last.
     // Tests of dependence take errors to be independent, and fail too then, if less plainly.
-    let is_whiteness = |test: &&TestResult| matches!(test.check, Check::Whiteness(_));
-    let of_correlation = least(&mut checked.checks.iter().filter(is_whiteness)).unwrap_or(1.0);
+    let of_correlation = least(&mut checked.checks.iter().filter(|test| test.check.is_of_whiteness())).unwrap_or(1.0);
     let may_be_correlation =
-        |test: &TestResult| is_whiteness(&test) || (test.shows_dependence() && test.p_value >= of_correlation);
+        |test: &TestResult| test.check.is_of_whiteness() || (test.shows_dependence() && test.p_value >= of_correlation);
     let only_correlated = checked.checks.iter().filter(|test| !test.passes).all(may_be_correlation);
     let sign = only_correlated.then_some(Sign::AutocorrelatedErrors);
     let errors = sign.into_iter().flat_map(|sign| with_sign(sign, without)).map(Cause::Effect);

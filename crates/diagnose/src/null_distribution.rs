@@ -27,15 +27,12 @@ impl<'m, 'a> NullDistribution<'m, 'a> {
 
     /// What simulated runs give, one after the other.
     pub(crate) fn resimulated<T: Send>(&self, of: impl Fn(&ModelFit<'_>) -> T + Sync) -> Vec<T> {
-        let again = |number: u64| of(&self.model.fit.resimulated(&mut terms(&self.model.candidates), number));
-        (1..=RESIMULATIONS).into_par_iter().map(again).collect()
+        of_each(|number| of(&self.model.fit.resimulated(&mut terms(&self.model.candidates), number)))
     }
 
     /// What scans of simulated runs give, one after the other.
     fn scanned<T: Send>(&self, of: impl Fn(&ModelFit<'_>) -> T + Sync) -> Vec<T> {
-        let fit = &self.model.fit;
-        let again = |number: u64| of(&fit.resimulated_without_pass(&mut terms(&self.model.candidates), number));
-        (1..=RESIMULATIONS).into_par_iter().map(again).collect()
+        of_each(|number| of(&self.model.fit.resimulated_without_pass(&mut terms(&self.model.candidates), number)))
     }
 
     /// By how much the score statistics of parts are inflated; 1 where they are not.
@@ -63,6 +60,11 @@ impl<'m, 'a> NullDistribution<'m, 'a> {
         };
         means(&self.resimulated(scores), self.model.candidates.len())
     }
+}
+
+/// What each simulation gives, by its number.
+fn of_each<T: Send>(of: impl Fn(u64) -> T + Sync) -> Vec<T> {
+    (1..=RESIMULATIONS).into_par_iter().map(&of).collect()
 }
 
 /// A score statistic over what it is by formula, on average.

@@ -71,7 +71,7 @@ pub(crate) fn check(model: &AugmentedModel<'_>) -> Checked {
     let fails = holm(&checks.iter().map(|check| check.p_value).collect::<Vec<_>>(), CHECKS_LEVEL);
     checks.iter_mut().zip(fails).for_each(|(check, fails)| check.passes = !fails);
     let is_displaced = fit.records.segments.iter().all(Segment::is_displacement);
-    let fails_to_be_white = checks.iter().any(|test| matches!(test.check, Check::Whiteness(_)) && !test.passes);
+    let fails_to_be_white = checks.iter().any(|test| test.check.is_of_whiteness() && !test.passes);
     let autocorrelated = is_displaced && fails_to_be_white && correlation.1.abs() > WHITENESS_Z;
     Checked { autocorrelated, checks, correlation, outliers }
 }

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use kinematics::{DriveGeometry, Increment, Pose, Wheels};
+use kinematics::{DriveGeometry, Increment, Pose, Twist, Wheels};
 use nalgebra::DVector;
 
 use crate::wheel_angles::WheelInterval;
@@ -159,6 +159,13 @@ impl Model {
     pub fn increment(&self, wheel_rad: Wheels<f64>) -> Increment {
         let travel_m = self.m_per_rad.zip_with(wheel_rad, |m_per_rad, rad| m_per_rad * rad);
         Increment::from_travel(travel_m, self.separation_m)
+    }
+
+    /// Velocity of the drive's centre at rates of the wheels.
+    #[inline(always)]
+    pub(crate) fn twist(&self, rate_rad_s: Wheels<f64>) -> Twist {
+        let Increment { distance_m, turn_rad } = self.increment(rate_rad_s);
+        Twist { v_m_s: distance_m, omega_rad_s: turn_rad }
     }
 
     /// How far the centre goes across the middle heading of an interval because its wheels do not turn

@@ -11,7 +11,7 @@ use crate::noise::{NOISES, NoiseComponent};
 use crate::noise_shape::CorrelatedErrors;
 
 /// Score of the cost by the logarithms of the variances, and its information.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct NoiseScore {
     pub(crate) gradient: Vector4<f64>,
     pub(crate) information: Matrix4<f64>,

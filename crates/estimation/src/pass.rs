@@ -30,7 +30,7 @@ use crate::settings::MIN_PARALLEL_WORK;
 use crate::thinning::{PropagationInterval, Selection};
 
 /// The result of a pass.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Pass {
     /// Each run's normal equation, in the order of sessions and runs; averaged over phases.
     pub runs: Vec<NormalEquations>,

@@ -222,8 +222,7 @@ impl<'f, 'a> Propagator<'f, 'a> {
     /// Velocity of the drive's centre at rates of the wheels.
     #[inline(always)]
     pub(crate) fn twist(&self, rate_rad_s: Wheels<f64>) -> Twist {
-        let Increment { distance_m, turn_rad } = self.model.increment(rate_rad_s);
-        Twist { v_m_s: distance_m, omega_rad_s: turn_rad }
+        self.model.twist(rate_rad_s)
     }
 
     /// What the terms add to the measurement after a number of propagations, at a pose of the drive's centre,

@@ -79,7 +79,7 @@ impl ModelFit<'_> {
             count_again(segment, &smooth, &mut draws);
         }
         let mut again = Self { records: Arc::new(records), ..self.clone() };
-        again.solution.pass = Pass::default();
+        again.solution.pass = Pass::nothing();
         again
     }
 

@@ -130,16 +130,10 @@ impl Segment<'_> {
         while at < self.intervals.len() && self.intervals[at].t_s + TIME_TOLERANCE_S < t_s {
             at += 1;
         }
-        let interval = match at {
-            0 => match self.intervals.first() {
-                Some(first) => return first.rate_at_ends_rad_s[0],
-                None => return Wheels::both(0.0),
-            },
-            _ => &self.intervals[at - 1],
-        };
-        let [start, end] = interval.rate_at_ends_rad_s;
-        let share = if interval.dt_s > 0.0 { ((t_s - interval.t_s) / interval.dt_s).clamp(0.0, 1.0) } else { 1.0 };
-        start.zip_with(end, |start, end| start + share * (end - start))
+        match at {
+            0 => self.intervals.first().map_or(Wheels::both(0.0), |first| first.rate_at_ends_rad_s[0]),
+            _ => self.intervals[at - 1].rate_at(t_s),
+        }
     }
 
     /// The first measured pose with its time and the number of intervals before it, and the time and pose of

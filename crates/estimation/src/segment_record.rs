@@ -1,7 +1,7 @@
 //! What the rows of a segment say of the motion from one instant to another, for terms by which a measurement
 //! is of another instant than its stamp.
 
-use kinematics::{Increment, Twist, Wheels};
+use kinematics::Wheels;
 use model_term::{MotionRecord, RecordedMotion};
 
 use crate::model::Model;
@@ -20,24 +20,15 @@ impl MotionRecord for SegmentRecord<'_> {
         let mut turned_rad = Wheels::both(0.0);
         let mut last = None;
         for interval in self.intervals[first..].iter().take_while(|interval| interval.t_s < to_s) {
-            let [start, end] = interval.rate_at_ends_rad_s;
-            let rate_at = |t_s: f64| {
-                let share = if interval.dt_s > 0.0 { (t_s - interval.t_s) / interval.dt_s } else { 1.0 };
-                start.zip_with(end, |start, end| start + share * (end - start))
-            };
             let (a_s, b_s) = (from_s.max(interval.t_s), to_s.min(interval.t_s + interval.dt_s));
-            let (a, b) = (rate_at(a_s), rate_at(b_s));
+            let (a, b) = (interval.rate_at(a_s), interval.rate_at(b_s));
             let half_s = 0.5 * (b_s - a_s);
             turned_rad = turned_rad.zip_with(a.zip_with(b, |a, b| half_s * (a + b)), |sum, of| sum + of);
             last = Some((b_s, b));
         }
         let (until_s, rate_rad_s) = last?;
-        let Increment { distance_m, turn_rad } = self.model.increment(rate_rad_s);
-        Some(RecordedMotion {
-            increment: self.model.increment(turned_rad),
-            until_s,
-            twist: Twist { v_m_s: distance_m, omega_rad_s: turn_rad },
-        })
+        let twist = self.model.twist(rate_rad_s);
+        Some(RecordedMotion { increment: self.model.increment(turned_rad), until_s, twist })
     }
 }
 

@@ -37,6 +37,15 @@ pub(crate) struct WheelInterval {
     pub(crate) interpolated_rad2: [Wheels<f64>; 2],
 }
 
+impl WheelInterval {
+    /// Rates of the wheels at an instant in it, rad/s; outside of it those at its nearer end.
+    pub(crate) fn rate_at(&self, t_s: f64) -> Wheels<f64> {
+        let [start, end] = self.rate_at_ends_rad_s;
+        let share = if self.dt_s > 0.0 { ((t_s - self.t_s) / self.dt_s).clamp(0.0, 1.0) } else { 1.0 };
+        start.zip_with(end, |start, end| start + share * (end - start))
+    }
+}
+
 /// Turns of both wheels since a run's first row.
 #[derive(Debug, Clone)]
 pub struct WheelAngleInterpolator<'a> {
