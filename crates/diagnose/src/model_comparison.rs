@@ -58,12 +58,16 @@ pub(crate) fn log_bayes_factor(base: &ModelFit<'_>, model: &AugmentedModel<'_>) 
 }
 
 /// The largest statistic that the error of form of the effects in a model may give to what is tested beside
-/// them. What the instrument and its clock do is known exactly; what a wheel, a floor or a castor does is
-/// not.
+/// them.
 pub(crate) fn form_error_statistic(model: &AugmentedModel<'_>) -> f64 {
-    let of_robot = model.candidates.iter().enumerate().filter(|(_, candidate)| !candidate.is_of_instrument());
-    let statistics = of_robot.filter_map(|(index, _)| wald_test(model, index)).map(|(test, _)| test.statistic);
+    let inexact = model.candidates.iter().enumerate().filter(|(_, candidate)| !candidate.has_exact_form());
+    let statistics = inexact.filter_map(|(index, _)| wald_test(model, index)).map(|(test, _)| test.statistic);
     MODEL_MISMATCH_FRACTION * statistics.fold(0.0, f64::max)
+}
+
+/// Difference in log odds from a model at which one of fewer effects is not discriminated from it.
+pub(crate) fn log_odds_margin_of(model: &AugmentedModel<'_>) -> f64 {
+    MIN_LOG_ODDS_MARGIN.max(0.5 * form_error_statistic(model))
 }
 
 /// Log Occam factor: how well sizes agree with their prior, and what their freedom costs.

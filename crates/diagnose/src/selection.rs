@@ -10,7 +10,7 @@ use crate::candidate::Candidate;
 use crate::fit_cache::FitCache;
 use crate::gain::gain;
 use crate::likelihood_ratio::significant_once_refitted;
-use crate::model_comparison::{form_error_statistic, log_bayes_factor, log_odds_margin, regated};
+use crate::model_comparison::{form_error_statistic, log_bayes_factor, log_odds_margin, log_odds_margin_of, regated};
 use crate::profile::fit_variant;
 use crate::ranking::{Entry, best_variants, tests_in};
 use crate::rivals::{Name, Refusal, Refusals, over_names, rivals};
@@ -108,8 +108,9 @@ fn without_what_cancels<'a>(
         subsets.push(model);
     }
     let odds: Vec<f64> = subsets.iter().map(|subset| log_bayes_factor(base, subset)).collect();
-    let best = odds.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let is_close = |odds: f64| odds >= best - log_odds_margin(best);
+    let best = odds.iter().copied().enumerate().max_by(|(_, a), (_, b)| a.total_cmp(b));
+    let (best, margin) = best.map_or((0.0, 0.0), |(best, odds)| (odds, log_odds_margin_of(&subsets[best])));
+    let is_close = |odds: f64| odds >= best - margin;
     let fewest = (0..subsets.len())
         .filter(|&subset| is_close(odds[subset]))
         .min_by(|&a, &b| {

@@ -31,6 +31,8 @@ pub struct Description {
     pub shown_by_counts: Option<ShownByCounts>,
     /// Its parameter that is an offset of the instrument's clock, seconds; `None` where it has none.
     pub clock_offset: Option<&'static str>,
+    /// It is the rate of a clock: its form is known as exactly as what an instrument does.
+    pub is_clock_rate: bool,
     /// What of the instrument's mounting on the robot it changes; `None` where it changes none.
     pub extrinsic: Option<Extrinsic>,
     /// The ratio of the drive's geometry that it changes, with its size of that meaning; of the geometry that
@@ -82,6 +84,7 @@ impl Description {
             restamped: None,
             shown_by_counts: None,
             clock_offset: None,
+            is_clock_rate: false,
             extrinsic: None,
             geometry: None,
             on_board: OnBoard::Never(UNSTATED),

@@ -1,6 +1,7 @@
 //! Operations on a fit beside the estimate: normal equations of blocks, decimation, and errors of dead
 //! reckoning with terms.
 
+use std::convert::Infallible;
 use std::sync::Arc;
 
 use kinematics::{Pose, wrap_to_pi};
@@ -13,7 +14,7 @@ use crate::model::{Instrument, Model};
 use crate::model_fit::ModelFit;
 use crate::noise::NoiseComponent;
 use crate::normal_equations::NormalEquations;
-use crate::optimizer::{Solution, start_heading};
+use crate::optimizer::{Solution, settled_from, start_heading};
 use crate::pass::pass;
 use crate::pass_options::{OutlierGate, PassOptions};
 use crate::propagation::{CarriedState, Propagator};
@@ -81,16 +82,22 @@ impl ModelFit<'_> {
                 Some(first) if first.from > 0 => start_heading(segment, model, first.from),
                 _ => free_headings[number],
             };
-            let mut headings: Vec<f64> = self.records.segments.iter().enumerate().map(of_segment).collect();
+            let rough: Vec<f64> = self.records.segments.iter().enumerate().map(of_segment).collect();
             let own = std::slice::from_ref(selection);
-            let mut found = pass(&self.records, own, model, noise, &headings, terms, pass_options);
-            for _ in 0..MAX_UNGATED_STEPS {
-                if found.headings.iter().all(|heading| heading.response.rest.abs() < HEADING_STEP_TOLERANCE_RAD) {
-                    break;
+            let settled = |mut headings: Vec<f64>, gate: OutlierGate| {
+                let pass_options = PassOptions { gate, ..pass_options };
+                let mut found = pass(&self.records, own, model, noise, &headings, terms, pass_options);
+                for _ in 0..MAX_UNGATED_STEPS {
+                    let heads = &found.headings;
+                    if heads.iter().all(|heading| heading.response.rest.abs() < HEADING_STEP_TOLERANCE_RAD) {
+                        break;
+                    }
+                    heads.iter().for_each(|heading| headings[heading.segment] += heading.response.rest);
+                    found = pass(&self.records, own, model, noise, &headings, terms, pass_options);
                 }
-                found.headings.iter().for_each(|heading| headings[heading.segment] += heading.response.rest);
-                found = pass(&self.records, own, model, noise, &headings, terms, pass_options);
-            }
+                Ok::<_, Infallible>((headings, found))
+            };
+            let Ok((_, found)) = settled_from(rough, pass_options.gate, settled);
             if sum.is_empty() {
                 sum = found.runs.iter().map(|run| NormalEquations::new(run.run, run.gradient.len())).collect();
             }

@@ -250,22 +250,44 @@ pub(crate) fn fit_from(
 pub(crate) fn pass_settled(
     records: &Records<'_>,
     selections: &[Selection],
-    mut model: Model,
+    model: Model,
     noise: &Noise,
 ) -> Result<(Model, Pass), EstimationError> {
     let options = FitOptions::of(&[]);
-    let mut headings: Vec<f64> = records.segments.iter().map(|segment| start_heading(segment, &model, 0)).collect();
-    for round in 1.. {
-        let found = pass(records, selections, &model, noise, &headings, &mut [], PassOptions::default());
-        let turned = found.headings.iter().map(|heading| heading.response.rest.abs()).fold(0.0, f64::max);
-        let mut next = model.clone();
-        let (_, own) = take_step(&mut next, &mut headings, &found, &options, DVector::zeros(0))?;
-        if (turned < HEADING_STEP_TOLERANCE_RAD && own < MEAN_STEP_TOLERANCE) || round == MAX_UNGATED_STEPS {
-            return Ok((model, found));
+    let headings: Vec<f64> = records.segments.iter().map(|segment| start_heading(segment, &model, 0)).collect();
+    settled_from((model, headings), OutlierGate::On, |(mut model, mut headings), gate| {
+        let pass_options = PassOptions { gate, ..PassOptions::default() };
+        for round in 1.. {
+            let found = pass(records, selections, &model, noise, &headings, &mut [], pass_options);
+            let turned = found.headings.iter().map(|heading| heading.response.rest.abs()).fold(0.0, f64::max);
+            let mut next = model.clone();
+            let (_, own) = take_step(&mut next, &mut headings, &found, &options, DVector::zeros(0))?;
+            if (turned < HEADING_STEP_TOLERANCE_RAD && own < MEAN_STEP_TOLERANCE) || round == MAX_UNGATED_STEPS {
+                return Ok(((model, headings), found));
+            }
+            model = next;
         }
-        model = next;
+        Err(EstimationError::Diverges)
+    })
+    .map(|((model, _), found)| (model, found))
+}
+
+/// The pass at which start headings settle, and where they do. `settled` gives both from a start.
+///
+/// To precise positions a start heading by a short path makes most of what comes later an outlier, and then
+/// nothing moves it. Where any is rejected, headings settle among all measurements first, and the gate is
+/// closed there; of the two the one that rejects fewer.
+pub(crate) fn settled_from<T: Clone, E>(
+    start: T,
+    gate: OutlierGate,
+    mut settled: impl FnMut(T, OutlierGate) -> Result<(T, Pass), E>,
+) -> Result<(T, Pass), E> {
+    let direct = settled(start.clone(), gate)?;
+    if gate == OutlierGate::Off || direct.1.outliers.is_empty() {
+        return Ok(direct);
     }
-    Err(EstimationError::Diverges)
+    let gated = settled(start, OutlierGate::Off).and_then(|(open, _)| settled(open, gate));
+    Ok(gated.ok().filter(|gated| gated.1.outliers.len() < direct.1.outliers.len()).unwrap_or(direct))
 }
 
 /// A pass at given values, with its innovations. `free_headings` has one start heading for each segment,
