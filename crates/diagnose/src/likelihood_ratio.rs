@@ -53,7 +53,7 @@ fn p_value(
     let (wald, _) = wald_test(refitted, model.candidates.len())?;
     // A ratio beyond Wald's statistic is of measurements that the gate took back.
     let ratio = (2.0 * (cost(&model.fit, most) - cost(&refitted.fit, most))).min(wald.statistic);
-    let over = |inflation: f64| p_of_ratio(scored.statistic / inflation, ratio / inflation, scored.dimensions);
+    let over = |inflation: f64| p_of_ratio(scored.statistic, ratio, scored.dimensions, inflation);
     let p_value = over(1.0);
     if p_value > level {
         return Some(p_value);

@@ -32,13 +32,14 @@ pub(crate) fn p_of_score(statistic: f64, dimensions: usize, count: f64, freedom:
 
 /// p-value of a refit, from the score's statistic and the likelihood ratio: F of a regression whose variance
 /// is estimated from n values, of which the score is n R² and the ratio −n ln(1 − R²); χ² of the ratio where
-/// it is no larger.
-pub(crate) fn p_of_ratio(score: f64, ratio: f64, dimensions: usize) -> f64 {
+/// it is no larger. F and χ² are judged over their `inflation`; from how many values the variance was
+/// estimated does not depend on it.
+pub(crate) fn p_of_ratio(score: f64, ratio: f64, dimensions: usize, inflation: f64) -> f64 {
     if dimensions == 0 || !score.is_finite() || !ratio.is_finite() {
         return 1.0;
     }
     if ratio <= score {
-        return p_of_chi_square(ratio, dimensions as f64);
+        return p_of_chi_square(ratio / inflation, dimensions as f64);
     }
     // score/ratio = R²/−ln(1 − R²), which falls from 1 to 0.
     let quotient = |share: f64| share / -(-share).ln_1p();
@@ -47,8 +48,12 @@ pub(crate) fn p_of_ratio(score: f64, ratio: f64, dimensions: usize) -> f64 {
         let share = 0.5 * (low + high);
         if quotient(share) * ratio > score { low = share } else { high = share }
     }
-    let values = score / (0.5 * (low + high));
-    p_of_score(score, dimensions, values, values)
+    let share = (0.5 * (low + high)).min(1.0 - 1e-9);
+    let left = score / share - dimensions as f64;
+    if left < 1.0 {
+        return 1.0;
+    }
+    p_of_statistic(left * share / (1.0 - share) / inflation, dimensions, left)
 }
 
 /// p-value of a χ² variable.
@@ -134,16 +139,16 @@ mod tests {
     /// one and nine degrees of freedom 9 · 0.8/0.2 = 36, which is t = 6 of nine.
     #[test]
     fn a_score_and_a_likelihood_ratio_say_how_many_values_there_are() {
-        let found = p_of_ratio(8.0, -10.0 * 0.2_f64.ln(), 1);
+        let found = p_of_ratio(8.0, -10.0 * 0.2_f64.ln(), 1, 1.0);
         assert!((found / p_of_student(6.0, 9.0) - 1.0).abs() < 1e-5, "{found}");
         // Between χ² of the ratio and χ² of the score.
         assert!(found > p_of_chi_square(16.09, 1.0) && found < p_of_chi_square(8.0, 1.0), "{found}");
         // Of very many values both are χ². Rejects a share that is found to a thousandth.
-        let many = p_of_ratio(20.0, -1e5 * (1.0 - 2e-4_f64).ln(), 1);
+        let many = p_of_ratio(20.0, -1e5 * (1.0 - 2e-4_f64).ln(), 1, 1.0);
         assert!((many / p_of_chi_square(20.0, 1.0) - 1.0).abs() < 1e-2, "{many}");
         // A ratio that is no larger than the score is χ² by itself.
-        assert_eq!(p_of_ratio(8.0, 5.0, 2), p_of_chi_square(5.0, 2.0));
-        assert_eq!((p_of_ratio(8.0, 5.0, 0), p_of_ratio(f64::NAN, 5.0, 1)), (1.0, 1.0));
+        assert_eq!(p_of_ratio(8.0, 5.0, 2, 2.0), p_of_chi_square(2.5, 2.0));
+        assert_eq!((p_of_ratio(8.0, 5.0, 0, 1.0), p_of_ratio(f64::NAN, 5.0, 1, 1.0)), (1.0, 1.0));
     }
 
     #[test]
