@@ -1,7 +1,8 @@
 //! Cross-validated gain of an extended model on held-out runs: folds by run, each protocol in every fold.
 //!
-//! Each fold's mean parameters are refitted to the other folds by one step of their normal equations; the
-//! noise, four numbers, is that of all runs for both models. Intervals are over runs (a ratio's linearised
+//! Each fold's mean parameters are refitted to the other folds by one step of their normal equations, and its
+//! score is that of the predictive density, averaged over what these leave open; the noise, four numbers, is
+//! that of all runs for both models. Intervals are over runs (a ratio's linearised
 //! standard error with Student's quantile).
 
 use std::collections::BTreeMap;
@@ -187,13 +188,14 @@ fn held_out_units(
         let Some(first) = others.next() else { return Err("too few runs to be held out".to_owned()) };
         let mut sum: NormalEquations = first.clone();
         others.for_each(|unit| sum.add(unit, 1.0));
-        let step = refit_step(sum.of(&fit.columns), &prior, &free)
+        let others = Posterior::of(sum.of(&fit.columns), &prior, &free)
             .ok_or("the other runs do not determine the model once some are held out")?;
         let mut model = fit.solution.model.clone();
-        fit.columns.iter().zip(step.iter()).for_each(|(column, by): (&Column, &f64)| model.advance(*column, *by));
+        let step = fit.columns.iter().zip(others.step.iter());
+        step.for_each(|(column, by): (&Column, &f64)| model.advance(*column, *by));
         models.push(model);
         for (unit, _) in units.iter().zip(&fold_of).filter(|(_, of)| **of == fold) {
-            let cost = unit.cost_after(&fit.columns, &step);
+            let cost = unit.cost() + others.cost_of(&unit.of(&fit.columns));
             scored.push(Unit { cost, equations: unit.clone(), run: unit.run, fold });
         }
     }
@@ -210,16 +212,40 @@ fn held_out_units(
     Ok((scored, ends))
 }
 
-/// One step of the fit to other runs, with the prior of each column: its size, and how precisely it is
-/// known before. What the other runs do not show of an effect, such as a payload that only the held-out run
-/// carried, is then none of it.
-fn refit_step(mut own: Information, prior: &[(f64, f64)], free: &DMatrix<f64>) -> Option<DVector<f64>> {
-    for (k, &(size, precision)) in prior.iter().enumerate() {
-        own.matrix[(k, k)] += precision;
-        own.gradient[k] += precision * size;
+/// What other runs say of the columns: the step to them, and a root of its covariance.
+struct Posterior {
+    step: DVector<f64>,
+    root: DMatrix<f64>,
+}
+
+impl Posterior {
+    /// By one step of the fit to other runs, with the prior of each column: its size, and how precisely it is
+    /// known before. What the other runs do not show of an effect, such as a payload that only the held-out run
+    /// carried, is then none of it.
+    fn of(mut own: Information, prior: &[(f64, f64)], free: &DMatrix<f64>) -> Option<Self> {
+        for (k, &(size, precision)) in prior.iter().enumerate() {
+            own.matrix[(k, k)] += precision;
+            own.gradient[k] += precision * size;
+        }
+        let own = own.along(free);
+        let covariance = inverse(&own.matrix, RIDGE)?;
+        let step = free * (-(&covariance * own.gradient));
+        Some(Self { step, root: free * covariance.cholesky()?.l() })
     }
-    let covariance = inverse(&own.along(free).matrix, RIDGE)?;
-    Some(free * (-(covariance * (free.transpose() * own.gradient))))
+
+    /// By how much held-out measurements cost more than at the values of the fit: −ln of their likelihood, to
+    /// second order, on average over what the other runs leave open. A point in its stead would charge a run
+    /// that alone shows an effect for what nobody else could know of it.
+    fn cost_of(&self, Information { matrix, gradient }: &Information) -> f64 {
+        let at_step = gradient.dot(&self.step) + 0.5 * (self.step.transpose() * matrix * &self.step)[0];
+        let gradient = self.root.transpose() * (gradient + matrix * &self.step);
+        let information = self.root.transpose() * matrix * &self.root;
+        let Some(both) = (DMatrix::identity(information.nrows(), information.nrows()) + information).cholesky() else {
+            return at_step;
+        };
+        let log_det = both.l_dirty().diagonal().iter().map(|value| value.ln()).sum::<f64>();
+        at_step + log_det - 0.5 * gradient.dot(&both.solve(&gradient))
+    }
 }
 
 /// For each column its size and how precisely it is known before: a term's is normal about nothing, as large
@@ -290,16 +316,33 @@ mod tests {
         let free = DMatrix::identity(2, 2);
         // −I⁻¹g = −[[3, −2], [−2, 4]]/8 · (−2, −4) = (−1/4, 3/2). Rejects a step along the gradient, of the
         // other sign.
-        let step = refit_step(information(), &[(0.0, 0.0); 2], &free).expect("determined");
+        let step_of = |prior: &[(f64, f64)], free| Posterior::of(information(), prior, free).expect("determined").step;
+        let step = step_of(&[(0.0, 0.0); 2], &free);
         assert!(is_near(&step, [-0.25, 1.5]), "{step}");
         // A prior of precision 1 about nothing, the second size being 2: I = [[4, 2], [2, 4]], g = (−2,
         // −2), step (1/3, 1/3). Rejects a prior about the estimate, which leaves g as it was.
-        let step = refit_step(information(), &[(0.0, 0.0), (2.0, 1.0)], &free).expect("determined");
+        let step = step_of(&[(0.0, 0.0), (2.0, 1.0)], &free);
         assert!(is_near(&step, [1.0 / 3.0, 1.0 / 3.0]), "{step}");
         // Only the first column free: 2/4. Rejects a step of all columns cut to the free ones, −1/4.
         let first = DMatrix::from_row_slice(2, 1, &[1.0, 0.0]);
-        let step = refit_step(information(), &[(0.0, 0.0); 2], &first).expect("determined");
+        let step = step_of(&[(0.0, 0.0); 2], &first);
         assert!(is_near(&step, [0.5, 0.0]), "{step}");
+    }
+
+    #[test]
+    fn held_out_measurements_cost_what_their_predictive_density_says() {
+        let of = |information, gradient| Information {
+            matrix: DMatrix::from_element(1, 1, information),
+            gradient: DVector::from_element(1, gradient),
+        };
+        // Others say 1 ± 1/2 of what the fit has as 0, and the held-out ones −3 ± 1: normal about 1 with the
+        // variance 1 + 1/4. At the fit's 0 they cost 9/2. Rejects the cost at 1 alone, 8.
+        let others = Posterior::of(of(4.0, -4.0), &[(0.0, 0.0)], &DMatrix::identity(1, 1)).expect("determined");
+        let expected = 0.5 * (16.0 / 1.25 + 1.25_f64.ln()) - 4.5;
+        assert!((others.cost_of(&of(1.0, 3.0)) - expected).abs() < 1e-9);
+        // A direction that nobody may move has no part in it.
+        let none = Posterior::of(of(4.0, -4.0), &[(0.0, 0.0)], &DMatrix::zeros(1, 0)).expect("determined");
+        assert_eq!(none.cost_of(&of(1.0, 3.0)), 0.0);
     }
 
     #[test]
