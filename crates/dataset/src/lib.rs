@@ -55,8 +55,8 @@ pub use read::{Blocks, Loaded, RunByRun, read};
 pub use receipt_delays::has_bunched_rows;
 pub use record::{
     CovarianceScale, Dataset, Displacement, ExtraChannel, MarkedPoint, NominalRobot, Odometry, PointReading, Protocol,
-    ProtocolSettings, Provenance, Run, RunInfo, TruthNoise, TruthSample, TruthSigma, UnknownMotion, WheelLog,
-    WheelSpeed,
+    ProtocolSettings, Provenance, RestoredMotion, Run, RunInfo, TruthNoise, TruthSample, TruthSigma, UnknownMotion,
+    WheelLog, WheelSpeed,
 };
 pub use replicates::{LANES, ReplicatedReading, ReplicatedRun, Replicates};
 pub use row_lengths::row_jitter_s;

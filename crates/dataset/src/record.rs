@@ -165,6 +165,9 @@ pub struct Run {
     /// Spans over which the counts do not tell how the robot moved, in time order. No part of the format:
     /// who examines the records sets them, and nothing is compared across them.
     pub unknown_motion: Vec<UnknownMotion>,
+    /// Spans over which counts were lost and are restored from the rows around, in time order. No part of the
+    /// format either.
+    pub restored_motion: Vec<RestoredMotion>,
     /// Distance that the robot had driven in the session before the run, metres; `None`: in the runs before
     /// it. No part of the format: who leaves runs or parts of them out sets it.
     pub session_m: Option<f64>,
@@ -218,6 +221,17 @@ pub struct UnknownMotion {
     pub from_s: f64,
     /// End, seconds from the run's start.
     pub to_s: f64,
+}
+
+/// A span over which counts were lost, and how well they are restored.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RestoredMotion {
+    /// Start, seconds from the run's start: a row.
+    pub from_s: f64,
+    /// End, seconds from the run's start: the next row.
+    pub to_s: f64,
+    /// Variance of each wheel's counts over it, counts².
+    pub variance_counts2: Wheels<f64>,
 }
 
 /// What is known of a run as a whole.

@@ -77,6 +77,7 @@ fn join_intervals<'a>(segment: &Segment<'a>, longest_s: f64) -> (Segment<'a>, Ve
                 last.wheel_rad = last.wheel_rad.zip_with(interval.wheel_rad, |last, rad| last + rad);
                 last.late_s[1] = interval.late_s[1];
                 last.interpolated_rad2[1] = interval.interpolated_rad2[1];
+                last.restored_rad2 = last.restored_rad2.zip_with(interval.restored_rad2, |last, rad2| last + rad2);
             }
             _ => joined.push(*interval),
         }

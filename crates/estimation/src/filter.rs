@@ -78,7 +78,8 @@ impl Kernel for FilterRun<'_, '_, '_> {
             let start_s = filter.segment.intervals.first().map_or(0.0, |interval| interval.t_s);
             filter.start(Pose::IDENTITY, (0.0, 0.0), 0, (0, start_s));
             let intervals = 0..filter.segment.intervals.len();
-            filter.predict(0, &PropagationInterval { intervals, from: 0, measurement: 0, noise: Covariances::ZERO });
+            let noise = Covariances::ZERO;
+            filter.predict(0, &PropagationInterval { intervals, from: 0, measurement: 0, noise, restored: None });
             return;
         };
         filter.propagator.skip(0..first.intervals.start);
@@ -336,6 +337,7 @@ impl<'f, 'a> Filter<'f, 'a> {
             first_term: layout.first_term(),
             noise: &propagation.noise,
             variance: [wheel, turn],
+            restored: propagation.restored.as_deref(),
             noise_score,
         };
         rounding.advance(&step);

@@ -29,6 +29,8 @@ pub(crate) struct Step<'s> {
     /// Covariances by the noise of wheels and turns in force.
     pub(crate) noise: &'s Covariances<2>,
     pub(crate) variance: [f64; 2],
+    /// Covariance by what is restored of lost counts.
+    pub(crate) restored: Option<&'s Covariance>,
     /// Whether derivatives by the variances are kept.
     pub(crate) noise_score: bool,
 }
@@ -37,7 +39,7 @@ impl FilterState<'_> {
     /// Moves on.
     #[inline(always)]
     pub(crate) fn advance(&mut self, step: &Step<'_>) {
-        let Step { motion, by_geometry, by_terms, first_term, noise, variance, noise_score } = *step;
+        let Step { motion, by_geometry, by_terms, first_term, noise, variance, restored, noise_score } = *step;
         let (sin, cos) = sin_cos(self.pose.theta_rad);
         let room = |v: Vector3<f64>| Vector3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z);
         let step = room(Vector3::new(motion.x_m, motion.y_m, motion.theta_rad));
@@ -51,6 +53,9 @@ impl FilterState<'_> {
         self.covariance.carry(-step.y, step.x);
         self.covariance.add(0, &noise, 0);
         self.covariance.add(0, &noise, 1);
+        if let Some(restored) = restored {
+            self.covariance.add(0, &restored.turned((sin, cos)), 0);
+        }
         if noise_score {
             self.covariance_by.carry(-step.y, step.x);
             self.covariance_by.add(NoiseComponent::Wheel as usize, &noise, 0);

@@ -169,6 +169,7 @@ mod tests {
                 stands: false,
                 starts_within_row: false,
                 interpolated_rad2: [Wheels::both(0.0); 2],
+                restored_rad2: Wheels::both(0.0),
             })
             .collect();
         let geometry = DriveGeometry::new(Wheels::both(2.0), 0.5).expect("a drive");
@@ -210,6 +211,7 @@ mod tests {
                 stands: false,
                 starts_within_row: false,
                 interpolated_rad2: [Wheels::both(0.0); 2],
+                restored_rad2: Wheels::both(0.0),
             }
         };
         turns.iter().map(of).collect()

@@ -288,6 +288,10 @@ impl<'f> PartialFilter<'f> {
                 self.noise_by.covariance_by[k][(row, column)] += added[(row, column)];
             }
         }
+        if let Some(restored) = &propagation.restored {
+            let added = restored.turned(turn).matrix(0);
+            (0..9).map(|at| (at / 3, at % 3)).for_each(|at| self.covariance[at] += added[at]);
+        }
         let of_terms = by_terms.iter().enumerate().map(|(k, by)| (Column::BASE.len() + k, *by));
         for (column, by) in moved.by_geometry.iter().copied().enumerate().chain(of_terms) {
             let by = room(by);

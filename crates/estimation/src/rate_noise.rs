@@ -141,6 +141,7 @@ mod tests {
             stands: false,
             starts_within_row,
             interpolated_rad2: EXACT,
+            restored_rad2: Wheels::both(0.0),
         }
     }
 

@@ -102,7 +102,9 @@ impl ModelFit<'_> {
                 let noise_m = (wheel * travel_m[side].abs()).sqrt() * draws.normal();
                 let sense = if side == Side::Left { -1.0 } else { 1.0 };
                 let bent_rad = within_row[side] * (to[side] - from[side]);
-                smooth[side] + bent_rad + (noise_m + sense * scrub_m) / model.m_per_rad[side]
+                let restored_rad2 = interval.restored_rad2[side];
+                let restored_rad = if restored_rad2 > 0.0 { restored_rad2.sqrt() * draws.normal() } else { 0.0 };
+                smooth[side] + bent_rad + restored_rad + (noise_m + sense * scrub_m) / model.m_per_rad[side]
             });
         }
         rolled

@@ -11,10 +11,11 @@
 
 use std::ops::Range;
 
+use kinematics::Side;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use crate::covariances::Covariances;
+use crate::covariances::{Covariance, Covariances};
 use crate::model::Model;
 use crate::noise::NoiseComponent;
 use crate::partial_observation::Place;
@@ -47,6 +48,8 @@ pub(crate) struct PropagationInterval {
     /// Covariance of the motion, in the frame of the body at its start, for a wheel noise of 1 m²/m and for a
     /// turn noise of 1 rad²/rad.
     pub(crate) noise: Covariances<2>,
+    /// Covariance of the motion for what is restored of lost counts; `None` where none is.
+    pub(crate) restored: Option<Box<Covariance>>,
 }
 
 impl PropagationInterval {
@@ -220,12 +223,8 @@ fn propagations(segment: &Segment<'_>, taken: &[usize], nominal: &Model) -> Vec<
         .map(|&measurement| {
             let intervals = from..segment.measurements[measurement].after;
             from = intervals.end;
-            let propagation = PropagationInterval {
-                noise: noise(segment, intervals.clone(), nominal),
-                intervals,
-                from: before,
-                measurement,
-            };
+            let (noise, restored) = noise(segment, intervals.clone(), nominal);
+            let propagation = PropagationInterval { noise, restored, intervals, from: before, measurement };
             before = measurement;
             propagation
         })
@@ -236,20 +235,17 @@ fn propagations(segment: &Segment<'_>, taken: &[usize], nominal: &Model) -> Vec<
 fn between_places(partial: &PartialSegment<'_>, nominal: &Model) -> Vec<PropagationInterval> {
     let between = |(number, pair): (usize, &[Place])| {
         let intervals = pair[0].after..pair[1].after;
-        PropagationInterval {
-            noise: noise(&partial.segment, intervals.clone(), nominal),
-            intervals,
-            from: number,
-            measurement: number + 1,
-        }
+        let (noise, restored) = noise(&partial.segment, intervals.clone(), nominal);
+        PropagationInterval { noise, restored, intervals, from: number, measurement: number + 1 }
     };
     partial.places.windows(2).enumerate().map(between).collect()
 }
 
-/// Covariance of a propagation interval's motion for unit noises, by the nominal drive: the geometry must not
-/// be estimated by its effect on covariances.
-fn noise(segment: &Segment<'_>, intervals: Range<usize>, nominal: &Model) -> Covariances<2> {
+/// Covariance of a propagation interval's motion for unit noises, and that for what is restored of lost counts,
+/// by the nominal drive: the geometry must not be estimated by its effect on covariances.
+fn noise(segment: &Segment<'_>, intervals: Range<usize>, nominal: &Model) -> (Covariances<2>, Option<Box<Covariance>>) {
     let mut noise = Covariances::ZERO;
+    let mut restored: Option<Box<Covariance>> = None;
     let mut theta_rad = 0.0;
     for interval in &segment.intervals[intervals] {
         let travel_m = nominal.m_per_rad.zip_with(interval.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
@@ -258,16 +254,24 @@ fn noise(segment: &Segment<'_>, intervals: Range<usize>, nominal: &Model) -> Cov
         let (sin, cos) = (theta_rad + 0.5 * turn_rad).sin_cos();
         let (dx_m, dy_m) = (distance_m * cos, distance_m * sin);
         noise.carry(-dy_m, dx_m);
+        if let Some(restored) = &mut restored {
+            restored.carry(-dy_m, dx_m);
+        }
         // ∂(x, y, θ)/∂(travel of the left and the right wheel) at the middle of the step; the turn acts on
         // half of the distance.
-        for (side, travel_m) in [(-1.0, travel_m.left), (1.0, travel_m.right)] {
-            let by_turn = side / nominal.separation_m;
+        for (side, sense) in [(Side::Left, -1.0), (Side::Right, 1.0)] {
+            let by_turn = sense / nominal.separation_m;
             let column = Vector3::new(0.5 * (cos - dy_m * by_turn), 0.5 * (sin + dx_m * by_turn), by_turn);
-            noise.add_outer(NoiseComponent::Wheel as usize, &column, travel_m.abs());
+            noise.add_outer(NoiseComponent::Wheel as usize, &column, travel_m[side].abs());
+            let restored_rad2 = interval.restored_rad2[side];
+            if restored_rad2 > 0.0 {
+                let variance_m2 = restored_rad2 * nominal.m_per_rad[side].powi(2);
+                restored.get_or_insert_with(|| Box::new(Covariance::ZERO)).add_outer(0, &column, variance_m2);
+            }
         }
         let column = Vector3::new(-0.5 * dy_m, 0.5 * dx_m, 1.0);
         noise.add_outer(NoiseComponent::Turn as usize, &column, turn_rad.abs());
         theta_rad += turn_rad;
     }
-    noise
+    (noise, restored)
 }

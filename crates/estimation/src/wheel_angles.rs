@@ -5,7 +5,7 @@
 //! same motion. A log whose rows jitter begins a little after its run does: half of an interval before the
 //! first row and after the last, the speeds of the interval there go on.
 
-use dataset::{NominalRobot, RunView, WheelLog, row_jitter_s};
+use dataset::{NominalRobot, RestoredMotion, Run, RunView, WheelLog, row_jitter_s};
 use kinematics::{Count, Wheels};
 
 use crate::settings::{MAX_EXTRAPOLATION, ROWS_OF_CHANGE, TIME_TOLERANCE_S};
@@ -35,6 +35,8 @@ pub(crate) struct WheelInterval {
     /// Variances of each wheel's turn at its start and at its end, rad²: what the motion within the row there
     /// may be off by from how the wheels are taken to speed up. 0 at a row.
     pub(crate) interpolated_rad2: [Wheels<f64>; 2],
+    /// Variance of each wheel's turn over it, rad², where its counts were lost and are restored; 0 elsewhere.
+    pub(crate) restored_rad2: Wheels<f64>,
 }
 
 impl WheelInterval {
@@ -57,6 +59,8 @@ pub struct WheelAngleInterpolator<'a> {
     rates: WheelRates,
     /// How late the stamps at the start and at the end of each row's interval are, seconds.
     late_s: Vec<[f64; 2]>,
+    /// Variances of the wheels' turns over the intervals of rows whose counts are restored, rad², by row.
+    restored_rad2: Vec<(usize, Wheels<f64>)>,
 }
 
 impl<'a> WheelAngleInterpolator<'a> {
@@ -115,7 +119,8 @@ impl<'a> WheelAngleInterpolator<'a> {
             // Which end of a row between gaps is off nobody knows; the length counts.
             row_jitter_s(&odometry.t_s).into_iter().map(|jitter_s| [-0.5 * jitter_s, 0.5 * jitter_s]).collect()
         };
-        Some(Self { t_s: &odometry.t_s, turn_rad, first_rad, continuous, rates, late_s })
+        let restored_rad2 = restored_rad2(run.run(), &odometry.t_s, quantum_rad);
+        Some(Self { t_s: &odometry.t_s, turn_rad, first_rad, continuous, rates, late_s, restored_rad2 })
     }
 
     /// How both wheels turned from one instant to a later one, row by row, radians; `None` when the log does
@@ -293,6 +298,16 @@ impl<'a> WheelAngleInterpolator<'a> {
         off_by.zip_with(self.row_rate(row), |off_by, rate| if rate == 0.0 { 0.0 } else { off_by })
     }
 
+    /// Variance of the wheels' turns over so many seconds of a row's interval, rad².
+    fn restored_over(&self, row: usize, dt_s: f64) -> Wheels<f64> {
+        let (Ok(at), Some(next_s)) =
+            (self.restored_rad2.binary_search_by_key(&row, |(row, _)| *row), self.t_s.get(row + 1))
+        else {
+            return Wheels::both(0.0);
+        };
+        self.restored_rad2[at].1.map(|variance_rad2| variance_rad2 * dt_s / (next_s - self.t_s[row]))
+    }
+
     /// Rates of the wheels at an instant of a row's interval, rad/s.
     fn rate_at(&self, row: usize, t_s: f64) -> Wheels<f64> {
         let Some(next_s) = self.t_s.get(row + 1) else { return self.rates.at_row(row) };
@@ -320,6 +335,17 @@ impl<'a> WheelAngleInterpolator<'a> {
         let turned = self.row_rad(row + 1).zip_with(self.row_rad(row), |end, start| end - start);
         turned.map(|turned_rad| if length_s > 0.0 { turned_rad / length_s } else { 0.0 })
     }
+}
+
+/// The rows whose intervals have counts that are restored, and the variances of the wheels' turns there, rad².
+/// Stamps may have been set right since: a span is of the row in whose interval its middle lies.
+fn restored_rad2(run: &Run, rows_s: &[f64], quantum_rad: Wheels<f64>) -> Vec<(usize, Wheels<f64>)> {
+    let of = |span: &RestoredMotion| {
+        let row = rows_s.partition_point(|row_s| *row_s <= 0.5 * (span.from_s + span.to_s)).checked_sub(1)?;
+        let variance_rad2 = span.variance_counts2.zip_with(quantum_rad, |variance, rad| variance * rad * rad);
+        (row + 1 < rows_s.len()).then_some((row, variance_rad2))
+    };
+    run.restored_motion.iter().filter_map(of).collect()
 }
 
 /// Reads a track in the order of time, in time that grows with its rows.
@@ -378,6 +404,7 @@ impl Cursor<'_, '_> {
                 t_s: at_s,
                 dt_s,
                 wheel_rad,
+                restored_rad2: self.track.restored_over(row, dt_s),
                 late_s: [at_s, t_s].map(|t_s| self.track.late_at(row, t_s)),
                 rate_rad_s,
                 rate_at_ends_rad_s: ends,

@@ -239,6 +239,7 @@ fn run(form: Form, points: usize) -> impl Strategy<Value = Run> {
                 distances,
                 walls,
                 unknown_motion: Vec::new(),
+                restored_motion: Vec::new(),
                 session_m: None,
             }
         })

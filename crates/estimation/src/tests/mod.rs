@@ -24,6 +24,7 @@ mod partial_poses;
 mod path_shape;
 mod rate_noise;
 mod records;
+mod restored;
 mod rounding;
 mod scores;
 mod selection;

@@ -115,6 +115,7 @@ fn measured_twice(moved_and_measured: [(f64, f64); 2], within_row: Option<[f64; 
             first_term: Column::BASE.len(),
             noise: &Covariances::ZERO,
             variance: [0.0; 2],
+            restored: None,
             noise_score: false,
         };
         on_state(&mut |rounding, state| {

@@ -11,6 +11,8 @@ use crate::hypothesis::median;
 const GAP_RATIO: f64 = 1.5;
 /// Counts that what both wheels show, over a row or a gap, may be off by as they are rounded: one of each.
 const MAX_ROUNDING: f64 = 2.0;
+/// Variance of a difference of two counts that are each rounded, counts².
+const ROUNDING_VARIANCE: f64 = 1.0 / 6.0;
 /// Rows to either side of a gap that say how fast the wheels turned: their rounding is a third of a row's.
 const ROWS_AROUND: usize = 3;
 /// Where so many times as many gaps lost counts as did not, all did: those that did not are mistakes.
@@ -173,6 +175,8 @@ pub(super) struct Gap {
     /// Counts that it lacks of those due at the speed of the rows before and after it together: exactly so
     /// where the acceleration is constant; the row after it shows less.
     pub(super) lacks: Wheels<f64>,
+    /// Variance of that, counts².
+    pub(super) variance_counts2: Wheels<f64>,
     pub(super) judgement: GapJudgement,
 }
 
@@ -224,6 +228,25 @@ fn judged(rows: f64, length_s: f64, shown: f64, beside: [Beside; 2]) -> GapJudge
         (_, lost) => Some(lost),
     };
     GapJudgement { is_lost, likely_lost, can_tell: least_kept > most_lost }
+}
+
+/// Variance of what is due over a gap of so many rows of a length, counts², by the rates of the rows before it
+/// and after it, those next to it first. They scatter from row to row, in the gap as beside it, and it may have
+/// gone at any between those next to it; what their counts' rounding adds to both is taken off, as over several
+/// rows it is that of the first and the last alone.
+fn variance_of_due(rates: &[Vec<f64>; 2], rows: f64, row_s: f64) -> f64 {
+    let [Some(before), Some(after)] = [rates[0].first(), rates[1].first()] else { return f64::INFINITY };
+    let (mut squares, mut freedom, mut count) = (0.0, 0.0, 0.0);
+    for side in rates {
+        let mean = side.iter().sum::<f64>() / side.len() as f64;
+        squares += side.iter().map(|rate| (rate - mean).powi(2)).sum::<f64>();
+        freedom += side.len() as f64 - 1.0;
+        count += side.len() as f64;
+    }
+    let of_row = if freedom > 0.0 { squares / freedom * row_s * row_s - ROUNDING_VARIANCE } else { 0.0 };
+    let between = (row_s * (after - before)).powi(2) - 2.0 * ROUNDING_VARIANCE;
+    let of_rounding = ROUNDING_VARIANCE * (1.0 + 2.0 * rows * rows / (count * count));
+    rows * of_row.max(0.0) * (1.0 + rows / count) + rows * rows * between.max(0.0) / 12.0 + of_rounding
 }
 
 /// The gaps of a run over which its wheels turned, and what they say of missing rows.
@@ -280,7 +303,13 @@ pub(super) fn gaps(run: &Run) -> (Vec<Gap>, Missing) {
                 missing.lost_share.add(due[side] * (of_gap - 1.0) / of_gap, lacks[side]);
             }
         }
-        found.push(Gap { row: k, missing: of_gap.round() - 1.0, lacks, judgement });
+        let variance_counts2 = Wheels::from_sides(|side| {
+            let rates = sides.map(|rows| -> Vec<f64> {
+                rows.iter().map(|row| shown[side][*row] / (t_s[row + 1] - t_s[*row])).collect()
+            });
+            variance_of_due(&rates, of_gap, (t_s[k + 1] - t_s[k]) / of_gap)
+        });
+        found.push(Gap { row: k, missing: of_gap.round() - 1.0, lacks, variance_counts2, judgement });
     }
     (found, missing)
 }
@@ -288,6 +317,26 @@ pub(super) fn gaps(run: &Run) -> (Vec<Gap>, Missing) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_due_over_a_gap_varies_as_the_rows_beside_it_do() {
+        let of = |before: [f64; 3], after: [f64; 3], rows: f64| {
+            variance_of_due(&[before.to_vec(), after.to_vec()], rows, 0.1)
+        };
+        // Ten counts in each row: rounding alone, of both ends, and of both sides' three rows over two.
+        let rounding = (1.0 + 8.0 / 36.0) / 6.0;
+        assert!((of([100.0; 3], [100.0; 3], 2.0) - rounding).abs() < 1e-12);
+        // What whole counts scatter by is no more than that.
+        assert!((of([100.0, 110.0, 100.0], [100.0, 100.0, 110.0], 2.0) - rounding).abs() < 0.5);
+        // From 10 to 20 counts a row: anything between over two rows, 20²/12.
+        let ramp = of([100.0; 3], [200.0; 3], 2.0);
+        assert!((ramp - rounding - 4.0 * (100.0 - 1.0 / 3.0) / 12.0).abs() < 1e-9, "{ramp}");
+        // Rows of 10, 15 and 5 counts: a variance of 25 over four degrees of freedom.
+        let rough = of([100.0, 150.0, 50.0], [100.0, 150.0, 50.0], 2.0);
+        assert!((rough - rounding - 2.0 * (25.0 - 1.0 / 6.0) * (1.0 + 2.0 / 6.0)).abs() < 1e-9, "{rough}");
+        // Nothing on one side says nothing.
+        assert!(variance_of_due(&[vec![100.0], Vec::new()], 2.0, 0.1).is_infinite());
+    }
 
     /// Less than two counts a row: no gap that lost them tells by itself, and all do together.
     #[test]
