@@ -37,6 +37,7 @@ mod standstills;
 mod table;
 mod timestamps;
 mod unit;
+mod unknown_motion;
 mod warning;
 mod write;
 
@@ -55,8 +56,7 @@ pub use read::{Blocks, Loaded, RunByRun, read};
 pub use receipt_delays::has_bunched_rows;
 pub use record::{
     CovarianceScale, Dataset, Displacement, ExtraChannel, MarkedPoint, NominalRobot, Odometry, PointReading, Protocol,
-    ProtocolSettings, Provenance, RestoredMotion, Run, RunInfo, TruthNoise, TruthSample, TruthSigma, UnknownMotion,
-    WheelLog, WheelSpeed,
+    ProtocolSettings, Provenance, Run, RunInfo, TruthNoise, TruthSample, TruthSigma, WheelLog, WheelSpeed,
 };
 pub use replicates::{LANES, ReplicatedReading, ReplicatedRun, Replicates};
 pub use row_lengths::row_jitter_s;
@@ -66,5 +66,6 @@ pub use settings::{MAX_ROW_S, MIN_LIDAR_TURN_RAD};
 pub use standstills::moving_pieces;
 pub use timestamps::Timestamps;
 pub use unit::Unit;
+pub use unknown_motion::{RestoredMotion, UnknownMotion};
 pub use warning::Warning;
 pub use write::{Existing, Writer, check_writable, write};
