@@ -8,7 +8,7 @@ use crate::map_distortion::MapDistortion;
 use crate::partial::{GyroNoise, GyroSample, HeadingReading, LidarExtrinsics, Revisit, TapeDistance, WallReading};
 use crate::pose_covariance::PoseCovariance;
 use crate::timestamps::Timestamps;
-use crate::unknown_motion::{RestoredMotion, UnknownMotion};
+use crate::unknown_motion::{RestoredMotion, UnknownMotion, join, reach_into};
 use jiff::Timestamp;
 use kinematics::{DriveGeometry, GeometryError, Point, Wheels};
 use serde::{Deserialize, Serialize};
@@ -191,6 +191,18 @@ impl Run {
     #[must_use]
     pub fn has_gyro(&self) -> bool {
         !self.gyro.is_empty() || self.odometry.extra.contains_key(&ExtraChannel::GyroYawRate)
+    }
+
+    /// Do the counts leave open how the robot moved, somewhere between two instants?
+    #[must_use]
+    pub fn is_motion_unknown(&self, from_s: f64, to_s: f64) -> bool {
+        reach_into(&self.unknown_motion, from_s, to_s)
+    }
+
+    /// The counts do not tell how the robot moved over some more spans.
+    pub fn add_unknown_motion(&mut self, spans: impl IntoIterator<Item = UnknownMotion>) {
+        self.unknown_motion.extend(spans);
+        join(&mut self.unknown_motion);
     }
 }
 

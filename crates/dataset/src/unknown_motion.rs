@@ -1,9 +1,7 @@
-//! Spans of a run over which the counts do not tell how the robot moved, or tell it as far as they are restored.
-//! No part of the format: who examines the records sets them.
+//! Spans of a run over which the counts do not tell how the robot moved, or tell it as far as they were
+//! restored. No part of the format: who examines the records sets them.
 
 use kinematics::Wheels;
-
-use crate::record::Run;
 
 /// A span over which the counts do not tell how the robot moved.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,27 +23,22 @@ pub struct RestoredMotion {
     pub variance_counts2: Wheels<f64>,
 }
 
-impl Run {
-    /// Do the counts leave open how the robot moved, somewhere between two instants?
-    #[must_use]
-    pub fn is_motion_unknown(&self, from_s: f64, to_s: f64) -> bool {
-        let first = self.unknown_motion.partition_point(|span| span.to_s <= from_s);
-        self.unknown_motion.get(first).is_some_and(|span| span.from_s < to_s)
-    }
+/// Does any of these spans, in time order and apart, reach into the time between two instants?
+pub(crate) fn reach_into(spans: &[UnknownMotion], from_s: f64, to_s: f64) -> bool {
+    let first = spans.partition_point(|span| span.to_s <= from_s);
+    spans.get(first).is_some_and(|span| span.from_s < to_s)
+}
 
-    /// The counts do not tell how the robot moved over some more spans.
-    pub fn add_unknown_motion(&mut self, spans: impl IntoIterator<Item = UnknownMotion>) {
-        self.unknown_motion.extend(spans);
-        self.unknown_motion.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
-        // Spans that overlap are one.
-        self.unknown_motion.dedup_by(|next, span| {
-            let overlaps = next.from_s <= span.to_s;
-            if overlaps {
-                span.to_s = span.to_s.max(next.to_s);
-            }
-            overlaps
-        });
-    }
+/// Puts spans in time order; those that overlap are one.
+pub(crate) fn join(spans: &mut Vec<UnknownMotion>) {
+    spans.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
+    spans.dedup_by(|next, span| {
+        let overlaps = next.from_s <= span.to_s;
+        if overlaps {
+            span.to_s = span.to_s.max(next.to_s);
+        }
+        overlaps
+    });
 }
 
 #[cfg(test)]
@@ -55,13 +48,12 @@ mod tests {
     #[test]
     fn spans_of_unknown_motion_are_in_order_and_apart() {
         let span = |from_s, to_s| UnknownMotion { from_s, to_s };
-        let mut run = Run::default();
-        assert!(!run.is_motion_unknown(0.0, 100.0));
-        run.add_unknown_motion([span(5.0, 6.0), span(1.0, 2.0)]);
-        run.add_unknown_motion([span(1.5, 3.0)]);
-        assert_eq!(run.unknown_motion, [span(1.0, 3.0), span(5.0, 6.0)]);
+        assert!(!reach_into(&[], 0.0, 100.0));
+        let mut spans = vec![span(5.0, 6.0), span(1.0, 2.0), span(1.5, 3.0)];
+        join(&mut spans);
+        assert_eq!(spans, [span(1.0, 3.0), span(5.0, 6.0)]);
         let is_unknown = [(0.0, 1.0), (0.0, 1.1), (2.9, 4.0), (3.0, 5.0), (5.5, 5.6), (6.0, 7.0)]
-            .map(|(from_s, to_s)| run.is_motion_unknown(from_s, to_s));
+            .map(|(from_s, to_s)| reach_into(&spans, from_s, to_s));
         assert_eq!(is_unknown, [false, true, true, false, true, false]);
     }
 }
