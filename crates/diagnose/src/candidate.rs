@@ -74,8 +74,8 @@ impl Candidate {
         }
     }
 
-    /// Whether its form is known exactly: what an instrument and the clocks do is, and what a wheel, a floor or
-    /// a castor does is not.
+    /// Whether its form is known exactly: what an instrument and the clocks do is, and what a wheel, a floor
+    /// or a castor does is not.
     pub(crate) fn has_exact_form(&self) -> bool {
         let is_clock_rate = |id| effects::description(id).is_some_and(|description| description.is_clock_rate);
         self.is_of_instrument() || matches!(self, Self::Effect { id, .. } if is_clock_rate(id))

@@ -220,8 +220,8 @@ struct Posterior {
 
 impl Posterior {
     /// By one step of the fit to other runs, with the prior of each column: its size, and how precisely it is
-    /// known before. What the other runs do not show of an effect, such as a payload that only the held-out run
-    /// carried, is then none of it.
+    /// known before. What the other runs do not show of an effect, such as a payload that only the held-out
+    /// run carried, is then none of it.
     fn of(mut own: Information, prior: &[(f64, f64)], free: &DMatrix<f64>) -> Option<Self> {
         for (k, &(size, precision)) in prior.iter().enumerate() {
             own.matrix[(k, k)] += precision;

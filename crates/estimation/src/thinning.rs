@@ -241,8 +241,8 @@ fn between_places(partial: &PartialSegment<'_>, nominal: &Model) -> Vec<Propagat
     partial.places.windows(2).enumerate().map(between).collect()
 }
 
-/// Covariance of a propagation interval's motion for unit noises, and that for what is restored of lost counts,
-/// by the nominal drive: the geometry must not be estimated by its effect on covariances.
+/// Covariance of a propagation interval's motion for unit noises, and that for what is restored of lost
+/// counts, by the nominal drive: the geometry must not be estimated by its effect on covariances.
 fn noise(segment: &Segment<'_>, intervals: Range<usize>, nominal: &Model) -> (Covariances<2>, Option<Box<Covariance>>) {
     let mut noise = Covariances::ZERO;
     let mut restored: Option<Box<Covariance>> = None;

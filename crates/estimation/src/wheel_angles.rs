@@ -337,8 +337,8 @@ impl<'a> WheelAngleInterpolator<'a> {
     }
 }
 
-/// The rows whose intervals have counts that are restored, and the variances of the wheels' turns there, rad².
-/// Stamps may have been set right since: a span is of the row in whose interval its middle lies.
+/// The rows whose intervals have counts that are restored, and the variances of the wheels' turns there,
+/// rad². Stamps may have been set right since: a span is of the row in whose interval its middle lies.
 fn restored_rad2(run: &Run, rows_s: &[f64], quantum_rad: Wheels<f64>) -> Vec<(usize, Wheels<f64>)> {
     let of = |span: &RestoredMotion| {
         let row = rows_s.partition_point(|row_s| *row_s <= 0.5 * (span.from_s + span.to_s)).checked_sub(1)?;

@@ -10,8 +10,8 @@ fn restored(from_s: f64) -> RestoredMotion {
     RestoredMotion { from_s, to_s: from_s + 1.0, variance_counts2: Wheels::both(12.0) }
 }
 
-/// Turns add up whatever the path is between: that of the heading is as on paper, in one part or in those that
-/// measurements within the row cut it into.
+/// Turns add up whatever the path is between: that of the heading is as on paper, in one part or in those
+/// that measurements within the row cut it into.
 #[test]
 fn what_is_restored_varies_the_heading_by_both_wheels() {
     let mut dataset = counted();

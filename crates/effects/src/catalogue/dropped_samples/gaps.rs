@@ -230,10 +230,10 @@ fn judged(rows: f64, length_s: f64, shown: f64, beside: [Beside; 2]) -> GapJudge
     GapJudgement { is_lost, likely_lost, can_tell: least_kept > most_lost }
 }
 
-/// Variance of what is due over a gap of so many rows of a length, counts², by the rates of the rows before it
-/// and after it, those next to it first. They scatter from row to row, in the gap as beside it, and it may have
-/// gone at any between those next to it; what their counts' rounding adds to both is taken off, as over several
-/// rows it is that of the first and the last alone.
+/// Variance of what is due over a gap of so many rows of a length, counts², by the rates of the rows before
+/// it and after it, those next to it first. They scatter from row to row, in the gap as beside it, and it may
+/// have gone at any between those next to it; what their counts' rounding adds to both is taken off, as over
+/// several rows it is that of the first and the last alone.
 fn variance_of_due(rates: &[Vec<f64>; 2], rows: f64, row_s: f64) -> f64 {
     let [Some(before), Some(after)] = [rates[0].first(), rates[1].first()] else { return f64::INFINITY };
     let (mut squares, mut freedom, mut count) = (0.0, 0.0, 0.0);
