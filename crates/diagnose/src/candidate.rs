@@ -161,4 +161,11 @@ mod tests {
         assert!(fewer.iter().all(|candidate| candidate.id() != "slip_speed") && fewer.len() < all.len());
         assert!(all.iter().all(|candidate| !candidate.parameters().is_empty()));
     }
+    #[test]
+    fn what_instruments_and_clocks_do_is_of_an_exact_form() {
+        let exact: Vec<&str> =
+            mean_terms(&[]).iter().filter(|candidate| candidate.has_exact_form()).map(Candidate::id).collect();
+        assert!(["clock_rate", "truth_latency", "truth_yaw"].iter().all(|id| exact.contains(id)), "{exact:?}");
+        assert!(["slip_speed", "interval_error", "backlash"].iter().all(|id| !exact.contains(id)), "{exact:?}");
+    }
 }

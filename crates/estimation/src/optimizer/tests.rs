@@ -140,3 +140,21 @@ fn steps_of_mean_and_noise_stand_one_below_the_other() {
     let step = stacked(&DVector::from_row_slice(&[1.0, 2.0]), &Vector4::new(3.0, 4.0, 5.0, 6.0));
     assert_eq!(step.as_slice(), [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
 }
+
+#[test]
+fn regress_a_start_that_makes_outliers_settles_among_all_measurements_first() {
+    // From its rough start the gate rejects so many, and the heading stays; among all it comes to 1, where so
+    // many are rejected.
+    let settled_with = |from_rough: usize, from_settled: usize| {
+        let pass = |outliers: usize| Pass { outliers: vec![(0, 0); outliers], ..Pass::nothing() };
+        let settled = |heading: f64, gate: OutlierGate| match gate {
+            OutlierGate::Off => Ok::<_, ()>((1.0, pass(0))),
+            OutlierGate::On => Ok((heading, pass(if heading == 1.0 { from_settled } else { from_rough }))),
+        };
+        settled_from(0.5, OutlierGate::On, settled).map(|(heading, pass)| (heading, pass.outliers.len()))
+    };
+    assert_eq!(settled_with(462, 3), Ok((1.0, 3)));
+    // What makes no fewer outliers is not taken: gross errors may turn a heading that is sought among all.
+    assert_eq!(settled_with(3, 462), Ok((0.5, 3)));
+    assert_eq!(settled_with(0, 462), Ok((0.5, 0)));
+}
