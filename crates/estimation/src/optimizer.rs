@@ -255,7 +255,7 @@ pub(crate) fn pass_settled(
 ) -> Result<(Model, Pass), EstimationError> {
     let options = FitOptions::of(&[]);
     let headings: Vec<f64> = records.segments.iter().map(|segment| start_heading(segment, &model, 0)).collect();
-    settled_from((model, headings), OutlierGate::On, |(mut model, mut headings), gate| {
+    let settled = |(mut model, mut headings): (Model, Vec<f64>), gate| {
         let pass_options = PassOptions { gate, ..PassOptions::default() };
         for round in 1.. {
             let found = pass(records, selections, &model, noise, &headings, &mut [], pass_options);
@@ -268,8 +268,12 @@ pub(crate) fn pass_settled(
             model = next;
         }
         Err(EstimationError::Diverges)
-    })
-    .map(|((model, _), found)| (model, found))
+    };
+    let start = (model, headings);
+    // Where all headings are measured, no start is rough.
+    let has_free = records.segments.iter().any(Segment::has_free_heading);
+    let found = if has_free { settled_from(start, OutlierGate::On, settled) } else { settled(start, OutlierGate::On) };
+    found.map(|((model, _), found)| (model, found))
 }
 
 /// The pass at which start headings settle, and where they do. `settled` gives both from a start.
