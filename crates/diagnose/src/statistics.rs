@@ -141,8 +141,8 @@ mod tests {
     fn a_score_and_a_likelihood_ratio_say_how_many_values_there_are() {
         let found = p_of_ratio(8.0, -10.0 * 0.2_f64.ln(), 1, 1.0);
         assert!((found / p_of_student(6.0, 9.0) - 1.0).abs() < 1e-5, "{found}");
-        // Of F that is inflated fourfold a quarter counts, t = 3, of as many values. Rejects a score and a ratio
-        // that are both divided, as if fewer values had been there.
+        // Of F that is inflated fourfold a quarter counts, t = 3, of as many values. Rejects a score and a
+        // ratio that are both divided, as if fewer values had been there.
         let inflated = p_of_ratio(8.0, -10.0 * 0.2_f64.ln(), 1, 4.0);
         assert!((inflated / p_of_student(3.0, 9.0) - 1.0).abs() < 1e-5, "{inflated}");
         // Between χ² of the ratio and χ² of the score.
