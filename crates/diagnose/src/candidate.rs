@@ -161,6 +161,7 @@ mod tests {
         assert!(fewer.iter().all(|candidate| candidate.id() != "slip_speed") && fewer.len() < all.len());
         assert!(all.iter().all(|candidate| !candidate.parameters().is_empty()));
     }
+
     #[test]
     fn what_instruments_and_clocks_do_is_of_an_exact_form() {
         let exact: Vec<&str> =

@@ -2,8 +2,8 @@
 //!
 //! Each fold's mean parameters are refitted to the other folds by one step of their normal equations, and its
 //! score is that of the predictive density, averaged over what these leave open; the noise, four numbers, is
-//! that of all runs for both models. Intervals are over runs (a ratio's linearised
-//! standard error with Student's quantile).
+//! that of all runs for both models. Intervals are over runs (a ratio's linearised standard error with
+//! Student's quantile).
 
 use std::collections::BTreeMap;
 
@@ -236,11 +236,11 @@ impl Posterior {
     /// By how much held-out measurements cost more than at the values of the fit: −ln of their likelihood, to
     /// second order, on average over what the other runs leave open. A point in its stead would charge a run
     /// that alone shows an effect for what nobody else could know of it.
-    fn cost_of(&self, Information { matrix, gradient }: &Information) -> f64 {
-        let at_step = gradient.dot(&self.step) + 0.5 * (self.step.transpose() * matrix * &self.step)[0];
-        let gradient = self.root.transpose() * (gradient + matrix * &self.step);
-        let information = self.root.transpose() * matrix * &self.root;
-        let Some(both) = (DMatrix::identity(information.nrows(), information.nrows()) + information).cholesky() else {
+    fn cost_of(&self, held_out: &Information) -> f64 {
+        let at_step = held_out.cost_of(&self.step);
+        let gradient = &held_out.gradient + &held_out.matrix * &self.step;
+        let Information { matrix, gradient } = Information { gradient, ..held_out.clone() }.along(&self.root);
+        let Some(both) = (DMatrix::identity(matrix.nrows(), matrix.nrows()) + matrix).cholesky() else {
             return at_step;
         };
         let log_det = both.l_dirty().diagonal().iter().map(|value| value.ln()).sum::<f64>();

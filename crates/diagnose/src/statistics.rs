@@ -22,12 +22,21 @@ pub(crate) fn p_of_statistic(statistic: f64, dimensions: usize, freedom: f64) ->
 /// is tested in them: it is at most `count`, and what it leaves of that is what the variance should have
 /// been estimated from (exact for one variance: F of the regression).
 pub(crate) fn p_of_score(statistic: f64, dimensions: usize, count: f64, freedom: f64) -> f64 {
-    let left = freedom - dimensions as f64;
-    if dimensions == 0 || !statistic.is_finite() || left < 1.0 {
+    if !statistic.is_finite() {
         return 1.0;
     }
-    let share = (statistic / count.max(1.0)).clamp(0.0, 1.0 - 1e-9);
-    p_of_statistic(left * share / (1.0 - share), dimensions, left)
+    p_of_share(statistic / count.max(1.0), dimensions, freedom, 1.0)
+}
+
+/// p-value of the share of a sum of squares that a regression explains, of so many values: its F over an
+/// inflation.
+fn p_of_share(share: f64, dimensions: usize, freedom: f64, inflation: f64) -> f64 {
+    let left = freedom - dimensions as f64;
+    if dimensions == 0 || left < 1.0 {
+        return 1.0;
+    }
+    let share = share.clamp(0.0, 1.0 - 1e-9);
+    p_of_statistic(left * share / (1.0 - share) / inflation, dimensions, left)
 }
 
 /// p-value of a refit, from the score's statistic and the likelihood ratio: F of a regression whose variance
@@ -48,12 +57,8 @@ pub(crate) fn p_of_ratio(score: f64, ratio: f64, dimensions: usize, inflation: f
         let share = 0.5 * (low + high);
         if quotient(share) * ratio > score { low = share } else { high = share }
     }
-    let share = (0.5 * (low + high)).min(1.0 - 1e-9);
-    let left = score / share - dimensions as f64;
-    if left < 1.0 {
-        return 1.0;
-    }
-    p_of_statistic(left * share / (1.0 - share) / inflation, dimensions, left)
+    let share = 0.5 * (low + high);
+    p_of_share(share, dimensions, score / share, inflation)
 }
 
 /// p-value of a χ² variable.

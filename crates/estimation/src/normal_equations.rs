@@ -58,8 +58,7 @@ impl NormalEquations {
     /// −log likelihood after a step of some columns, to second order.
     #[must_use]
     pub fn cost_after(&self, columns: &[Column], step: &DVector<f64>) -> f64 {
-        let Information { matrix, gradient } = self.of(columns);
-        self.cost() + gradient.dot(step) + 0.5 * (step.transpose() * matrix * step)[0]
+        self.cost() + self.of(columns).cost_of(step)
     }
 
     /// The block of the information with these rows and columns.
@@ -92,6 +91,12 @@ pub struct Information {
 }
 
 impl Information {
+    /// By how much a step raises the cost, to second order.
+    #[must_use]
+    pub fn cost_of(&self, step: &DVector<f64>) -> f64 {
+        self.gradient.dot(step) + 0.5 * (step.transpose() * &self.matrix * step)[0]
+    }
+
     /// The system along the columns of a basis.
     #[must_use]
     pub fn along(&self, basis: &DMatrix<f64>) -> Self {
