@@ -10,6 +10,7 @@
 mod alternatives;
 mod anomaly_findings;
 mod augmented_model;
+mod cancellation;
 mod candidate;
 mod carry_over;
 mod cause;
@@ -62,6 +63,7 @@ mod stage;
 mod stamp_errors;
 mod statistics;
 mod text;
+mod turn_to_turn;
 mod unknown_motion;
 mod wald;
 

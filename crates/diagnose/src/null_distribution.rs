@@ -102,10 +102,15 @@ pub(crate) fn beyond_simulated((coefficient, sigmas): (f64, f64), simulated: &[(
     (left(coefficient, coefficient_mean), left(sigmas, sigmas_mean) / variance.sqrt().max(1.0))
 }
 
+/// z of simulated runs below this count as this: a likelihood ratio of a variance at its boundary is 0 and its
+/// p-value 1 every other time, which is no scatter of the upper tail.
+const LOWEST_Z: f64 = -1.0;
+
 /// Upper tail of a value among simulated ones, which are normal with unknown mean and variance: not below 0
 /// and 1, by formula.
 fn judged(z: f64, simulated: &[f64]) -> f64 {
     let count = simulated.len() as f64;
+    let simulated: Vec<f64> = simulated.iter().map(|z| z.max(LOWEST_Z)).collect();
     let mean = simulated.iter().sum::<f64>() / count;
     let variance = simulated.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / (count - 1.0);
     let (mean, sd) = (mean.max(0.0), variance.sqrt().max(1.0));
@@ -132,6 +137,9 @@ mod tests {
         // Below the formula's mean and variance nothing is gained. Rejects a z over its own sd of 0.1.
         let p = judged(3.0, &[-1.1, -1.0, -0.9]);
         assert!((p - p_of_upper_student(3.0 / (4.0_f64 / 3.0).sqrt(), 2.0)).abs() < 1e-12, "{p}");
+        // p-values of 1 are no scatter: −7 counts as −1, mean 0 and variance 4/3. Rejects a variance of 18.
+        let p = judged(6.0, &[-7.0, -7.0, 1.0, 1.0]);
+        assert!((p - p_of_upper_student(6.0 / (4.0_f64 / 3.0 * 1.25).sqrt(), 3.0)).abs() < 1e-12, "{p}");
     }
 
     #[test]

@@ -1,11 +1,9 @@
 //! Forward selection over the catalogue with refits, and the causes that the data do not discriminate.
 
-use std::ops::Range;
-
-use estimation::{ModelFit, total};
-use nalgebra::{DMatrix, DVector};
+use estimation::ModelFit;
 
 use crate::augmented_model::AugmentedModel;
+use crate::cancellation::cancel;
 use crate::candidate::Candidate;
 use crate::fit_cache::FitCache;
 use crate::gain::gain;
@@ -16,7 +14,7 @@ use crate::ranking::{Entry, best_variants, tests_in};
 use crate::rivals::{Name, Refusal, Refusals, over_names, rivals};
 use crate::run_to_run::differs_from_run_to_run;
 use crate::settings::levels::{CLUSTER_ROBUST_LEVEL, MAX_EFFECTS, SCAN_LEVEL, TURN_SCATTER_LEVEL};
-use crate::settings::search::{MAX_CANCELLATION, MAX_CANDIDATES_TRIED, MAX_DRIFT_INCREASE_INTERVALS};
+use crate::settings::search::{MAX_CANDIDATES_TRIED, MAX_DRIFT_INCREASE_INTERVALS};
 use crate::statistics::sidak;
 use crate::wald::{Test, cluster_robust_test, p_value_over, tests_of, wald_test};
 
@@ -101,8 +99,8 @@ fn without_what_cancels<'a>(
         })
         .collect();
     let all: Vec<&'static str> = model.candidates.iter().map(Candidate::id).collect();
-    subsets.retain(|subset| cancellation(subset) <= MAX_CANCELLATION);
-    let all_cancel = cancellation(&model) > MAX_CANCELLATION;
+    subsets.retain(|subset| !cancel(subset));
+    let all_cancel = cancel(&model);
     // A single effect cancels nothing, but may have no fit of its own.
     if !all_cancel || subsets.is_empty() {
         subsets.push(model);
@@ -124,42 +122,6 @@ fn without_what_cancels<'a>(
         refusals.extend(all.into_iter().filter(|id| !left.contains(id)).map(|id| (id, Refusal::Cancels)));
     }
     chosen
-}
-
-/// How much more an effect would explain by itself, at the size that it has beside others, than it does
-/// together with them: the largest θᵢᵀIᵢᵢθᵢ over θᵀIθ of any that are taken together, with the information I
-/// that the free columns and the other effects leave.
-fn cancellation(model: &AugmentedModel<'_>) -> f64 {
-    let Some(equations) = total(&model.fit.solution.pass.runs) else { return 0.0 };
-    let effects = model.candidates.len();
-    let of_some = |chosen: u32| {
-        let chosen: Vec<usize> = (0..effects).filter(|index| chosen >> index & 1 == 1).collect();
-        let columns: Vec<usize> = chosen.iter().flat_map(|&index| model.columns(index)).collect();
-        let sizes: Vec<f64> = chosen.iter().flat_map(|&index| model.estimates(index).as_slice().to_vec()).collect();
-        let information = model.fit.eliminated(&equations, &columns)?.of_columns(&equations, &columns).information;
-        let mut end = 0;
-        let parts = chosen.iter().map(|&index| {
-            let start = end;
-            end += model.range(index).len();
-            start..end
-        });
-        Some(largest_part(&information, &DVector::from_vec(sizes), parts))
-    };
-    (0..1_u32 << effects).filter(|chosen| chosen.count_ones() > 1).filter_map(of_some).fold(0.0, f64::max)
-}
-
-/// The largest θᵢᵀIᵢᵢθᵢ over θᵀIθ.
-fn largest_part(
-    information: &DMatrix<f64>,
-    estimates: &DVector<f64>,
-    parts: impl Iterator<Item = Range<usize>>,
-) -> f64 {
-    let explained = |range: Range<usize>| {
-        let (own, size) = (estimates.rows_range(range.clone()), range.len());
-        own.dot(&(information.view((range.start, range.start), (size, size)) * own))
-    };
-    let together = explained(0..estimates.len());
-    parts.map(|part| explained(part) / together).fold(0.0, f64::max)
 }
 
 /// Whether a refit confirms what a score says of a candidate, or why not.
@@ -343,20 +305,6 @@ mod tests {
         // Both underflow: the larger statistic. Rejects the first in the catalogue's order.
         let large = best_variants(&[scored("slip_speed", 5e3, 9.0, 1), scored("backlash", 6e3, 1.0, 1)]);
         assert_eq!(most_significant(&large, 2.0, 0.03).map(|entry| entry.scored.candidate.id()), Some("backlash"));
-    }
-
-    #[test]
-    fn effects_that_take_each_other_back_explain_more_one_by_one() {
-        // Correlation 0.9 between two of information 1. Sizes 1 and −1: each explains 1, both 2 − 1.8.
-        let information = DMatrix::from_row_slice(3, 3, &[1.0, 0.9, 0.0, 0.9, 1.0, 0.0, 0.0, 0.0, 1.0]);
-        let of = |sizes: [f64; 3], parts: [Range<usize>; 2]| {
-            largest_part(&information, &DVector::from_column_slice(&sizes), parts.into_iter())
-        };
-        assert!((of([1.0, -1.0, 0.0], [0..1, 1..2]) - 5.0).abs() < 1e-12);
-        // Of one sense they help each other: 1 of 3.8. Rejects a ratio that goes by correlation alone.
-        assert!((of([1.0, 1.0, 0.0], [0..1, 1..2]) - 1.0 / 3.8).abs() < 1e-12);
-        // Parameters of one effect may cancel: together they are one part, of all that is explained but 1.
-        assert!((of([1.0, -1.0, 1.0], [0..2, 2..3]) - 1.0 / 1.2).abs() < 1e-12);
     }
 
     #[test]

@@ -27,6 +27,7 @@ use crate::selection::{search, search_ungated};
 use crate::settings::levels::SCAN_LEVEL;
 use crate::small_robot::{assert_unmoved, effect, fitted, session, with_effects};
 use crate::sparse_terms::{SparseSearch, lack_of_fit};
+use crate::turn_to_turn::differs_from_turn_to_turn;
 use crate::wald::{cluster_robust_test, p_value_over, tests_of};
 
 /// A robot whose right wheel seems larger in every other run, so that runs differ.
@@ -68,6 +69,7 @@ fn asked(datasets: &[Dataset]) -> String {
     let equations = &model.fit.solution.pass.runs[0];
     line("left out", &[left_out_cost(equations, equations.count + 2.0), left_out_cost(equations, 1.0)]);
     line("runs differ", &[differs_from_run_to_run(&alone), differs_from_run_to_run(&model)]);
+    line("turns differ", &[differs_from_turn_to_turn(&alone), differs_from_turn_to_turn(&model)]);
     line("margins", &[margin_over_units(10.0, &model, &alone), margin_over_units(1000.0, &of_latency, &model)]);
     line("Bayes", &[log_bayes_factor(&base, &model), log_bayes_factor(&base, &of_latency)]);
     line("form", &[form_error_statistic(&model), form_error_statistic(&of_latency)]);

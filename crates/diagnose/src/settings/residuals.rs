@@ -123,3 +123,15 @@ pub(crate) const MIN_BIN_WIDTH: f64 = 0.025;
 /// Relative. Values of a covariate that differ by less are one level.
 /// Tuned: by hand; no record of what on.
 pub(crate) const COVARIATE_TOLERANCE: f64 = 1e-6;
+
+/// Number. Turns of a run that have a score of their own; the next ones share those of the first.
+/// Derived: 32 scores tell a variance to a quarter of itself.
+pub(crate) const TURNS_PER_RUN: usize = 32;
+
+/// Fraction of a turn's largest rate. Below it the turn is over.
+/// Convention: a tenth; between two motions in one sense wheels stand for less than a row.
+pub(crate) const TURN_ENDS_AT: f64 = 0.1;
+
+/// Fraction of the largest rate of the turn before. Above it the next turn begins.
+/// Convention: twice where one ends.
+pub(crate) const TURN_BEGINS_AT: f64 = 0.2;

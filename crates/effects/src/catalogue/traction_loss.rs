@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use crate::benchmark::{Benchmark, HostRobot, ParameterValue};
 use crate::description::{Description, IsolatedError};
 use crate::effect::{EffectError, PhysicalEffect};
-use crate::forward::{Forward, Hooks, Step};
+use crate::forward::{Forward, Hooks, RunStart, Step};
 use crate::hypothesis::{Hypothesis, Variant, Sign, value_of};
 
 mod on_board;
@@ -141,10 +141,11 @@ impl State {
 
 impl Forward for State {
     fn hooks(&self) -> Hooks {
-        Hooks { start_motion: true, floor: true, ..Hooks::NONE }
+        Hooks { on_run_start: true, floor: true, ..Hooks::NONE }
     }
 
-    fn start_motion(&mut self) {
+    /// A robot is put down at rest. At the start of a later motion its wheels stand, but it may be sliding yet.
+    fn on_run_start(&mut self, _: &mut RunStart<'_>) {
         self.ground_m_s = Wheels::both(0.0);
         self.sliding = Wheels::both(false);
     }
@@ -305,7 +306,6 @@ mod tests {
         let mut state = TractionLoss { static_friction: 0.1, kinetic_friction: 0.06, stribeck_speed_m_s: 0.05 }
             .forward()
             .expect("acts");
-        state.start_motion();
         let (mut speed_m_s, mut ground_m, mut tread_m, dt_s) = (0.0_f64, 0.0, 0.0, 1e-4);
         let ramp_s = 0.4 / acceleration_m_s2;
         for k in 0..((ramp_s + 0.9) / dt_s) as u32 {
@@ -332,6 +332,32 @@ mod tests {
         let loss = |friction_m_s2: f64| 0.08 * (1.0 / friction_m_s2 - 1.0 / 3.0);
         let lost_m = tread_m - ground_m;
         assert!(lost_m > loss(0.1 * GRAVITY_M_S2) && lost_m < loss(0.06 * GRAVITY_M_S2), "{lost_m}");
+    }
+
+    #[test]
+    fn a_robot_that_slides_yet_when_its_wheels_stand_slides_on_into_the_next_motion() {
+        let mut state = TractionLoss { static_friction: 0.1, kinetic_friction: 0.06, stribeck_speed_m_s: 0.05 }
+            .forward()
+            .expect("acts");
+        // From 0.4 m/s on treads that stop at once, and go on standing over the start of another motion.
+        let mut ground_m = 0.0;
+        for k in 0..20_000 {
+            let mut step = specimen_step();
+            step.dt_s = 1e-4;
+            let speed_m_s = if k < 10_000 { f64::from(k) * 4e-5 } else { 0.0 };
+            step.rate_rad_s.left = speed_m_s / 0.08;
+            step.acceleration_rad_s2.left = if k == 10_000 { -50.0 } else { 5.0 * f64::from(u8::from(k < 10_000)) };
+            step.travel_m.left = speed_m_s * step.dt_s;
+            if k == 10_500 {
+                state.start_motion();
+            }
+            state.floor(&mut step);
+            ground_m += if k >= 10_000 { step.travel_m.left } else { 0.0 };
+        }
+        // Between v²/2a of the friction at rest and of that when sliding fast. Rejects a robot that the start of
+        // a motion stops, which goes 0.018 m.
+        let slide_m = |friction: f64| 0.08 / (friction * GRAVITY_M_S2);
+        assert!(ground_m > slide_m(0.1) && ground_m < slide_m(0.06), "{ground_m}");
     }
 
     /// A wheel under control trembles: speed about its mean after some time, m/s, and the acceleration, m/s².
