@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use crate::augmented_model::AugmentedModel;
 use crate::candidate::{Candidate, terms};
 use crate::scan::{detectable_statistic, scan_parts_of};
-use crate::settings::residuals::RESIMULATIONS;
+use crate::settings::residuals::{LOWEST_SIMULATED_Z, RESIMULATIONS};
 use crate::statistics::{p_of_upper_student, z_of_upper};
 
 /// A model whose tests depend on the rounding of counts.
@@ -102,15 +102,11 @@ pub(crate) fn beyond_simulated((coefficient, sigmas): (f64, f64), simulated: &[(
     (left(coefficient, coefficient_mean), left(sigmas, sigmas_mean) / variance.sqrt().max(1.0))
 }
 
-/// z of simulated runs below this count as this: a likelihood ratio of a variance at its boundary is 0 and its
-/// p-value 1 every other time, which is no scatter of the upper tail.
-const LOWEST_Z: f64 = -1.0;
-
 /// Upper tail of a value among simulated ones, which are normal with unknown mean and variance: not below 0
 /// and 1, by formula.
 fn judged(z: f64, simulated: &[f64]) -> f64 {
     let count = simulated.len() as f64;
-    let simulated: Vec<f64> = simulated.iter().map(|z| z.max(LOWEST_Z)).collect();
+    let simulated: Vec<f64> = simulated.iter().map(|z| z.max(LOWEST_SIMULATED_Z)).collect();
     let mean = simulated.iter().sum::<f64>() / count;
     let variance = simulated.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / (count - 1.0);
     let (mean, sd) = (mean.max(0.0), variance.sqrt().max(1.0));
