@@ -230,15 +230,14 @@ fn stages(
     };
     let is_open = |candidate: &Candidate| stamps.is_none_or(|error| error.candidate.id() != candidate.id());
     let mut catalogue: Vec<Candidate> = every_term.into_iter().filter(is_open).collect();
-    let uncorrelated = (!is_correlated(&base, &[])).then(|| base.clone());
     let mut structure = mean_structure(records, base, &catalogue);
     // Where the counts do not follow the robot at all, no small effect has a meaning: only one with which
     // they follow it, such as a clock that is off.
     let found = &structure.found.model;
-    let uncorrelated = uncorrelated.filter(|_| !is_correlated(&found.fit, &found.candidates));
-    let is_uncorrelated = uncorrelated.is_some();
-    if let Some(base) = uncorrelated {
+    let is_uncorrelated = !is_correlated(&found.fit, &found.candidates);
+    if is_uncorrelated {
         catalogue.clear();
+        let base = structure.base;
         structure = mean_structure(records, base, &catalogue);
     }
     // Records that were corrected are not those of which all rows were looked at.

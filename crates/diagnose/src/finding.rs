@@ -309,14 +309,18 @@ pub(crate) fn of_geometry(deviation: GeometryDeviation, without: &[String]) -> F
         let (of, name) = effects::description(id)?.geometry?;
         (of == deviation.of && !without.iter().any(|out| out == id)).then_some((id, name))
     };
-    let (cause, parameters) = match CATALOGUE.iter().copied().find_map(ratio_of) {
+    let (mut causes, parameters) = match CATALOGUE.iter().copied().find_map(ratio_of) {
         Some((id, name)) => {
             let value = Value { value: deviation.ratio, sigma: Some(deviation.sigma), unit: "1".to_owned() };
-            (Cause::Effect(id), BTreeMap::from([(name.to_owned(), value)]))
+            (vec![Cause::Effect(id)], BTreeMap::from([(name.to_owned(), value)]))
         }
-        None => (Cause::Unknown, BTreeMap::new()),
+        None => (Vec::new(), BTreeMap::new()),
     };
-    of_causes(vec![cause], p_of_chi_square(deviation.chi_square(), 1.0), parameters, Basis::Geometry(deviation))
+    // A fit of something else has another robot's geometry too.
+    if causes.is_empty() || !deviation.is_of_skid_steering() {
+        causes.push(Cause::Unknown);
+    }
+    of_causes(causes, p_of_chi_square(deviation.chi_square(), 1.0), parameters, Basis::Geometry(deviation))
 }
 
 /// The finding of a clock that is far off.

@@ -18,11 +18,10 @@ use crate::document::Value;
 use crate::finding;
 use crate::finding::Finding;
 use crate::mean_structure::MeanStructure;
-use crate::null_distribution::{NullDistribution, among_simulated};
 use crate::outlier_attribution::{ErrorSource, log_likelihoods};
 use crate::residual_tests::residual_persistence;
 use crate::run_to_run::differs_from_run_to_run;
-use crate::settings::levels::{TURN_SCATTER_LEVEL, TURN_SCATTER_SIMULATED_LEVEL};
+use crate::settings::levels::TURN_SCATTER_LEVEL;
 use crate::settings::residuals::{
     DEPENDENCE_BEYOND_TAILS_LEVEL, ISOLATED_TO_PERSISTENT_RATIO, MAX_OUTLIER_FRACTION, NOISE_EFFECT_LEVEL,
     NORMAL_KURTOSIS,
@@ -137,21 +136,9 @@ fn with_sign(sign: Sign, without_ids: &[String]) -> Vec<Cause> {
 /// Turns that scatter more than the wheels' noise explains, whatever else was found.
 fn of_turns(structure: &MeanStructure<'_>, without_ids: &[String]) -> Option<Finding> {
     let model = structure.model();
-    let (without, mut p_value) = without_turn_noise(model)?;
-    // Any other error of the model makes turns differ too, which the level is for; that rounding does not,
-    // a few simulated runs say.
+    let p_value = p_of_turn_scatter(model)?;
     if p_value >= TURN_SCATTER_LEVEL {
         return None;
-    }
-    if let Some(null) = NullDistribution::of(&without) {
-        let simulated = null.resimulated(|again| {
-            let fit = model.fit.on_runs_of(again, &mut terms(&model.candidates)).ok()?;
-            Some(without_turn_noise(&AugmentedModel { fit, ..model.clone() })?.1)
-        });
-        p_value = among_simulated(p_value, simulated.iter().flatten());
-        if p_value >= TURN_SCATTER_SIMULATED_LEVEL {
-            return None;
-        }
     }
     let sigma = model.fit.solution.noise.sigma(NoiseComponent::Turn);
     let value = Value { value: sigma, sigma: None, unit: "rad/sqrt(rad)".to_owned() };
@@ -163,14 +150,19 @@ fn of_turns(structure: &MeanStructure<'_>, without_ids: &[String]) -> Option<Fin
     Some(found)
 }
 
-/// The model without the turns' own noise, and the p-value of what that explains; `None` where the fit
-/// without it diverges.
-fn without_turn_noise<'a>(model: &AugmentedModel<'a>) -> Option<(AugmentedModel<'a>, f64)> {
-    let fit = model.fit.without_noise(NoiseComponent::Turn, &mut terms(&model.candidates)).ok()?;
-    let most = count(&fit).max(count(&model.fit));
-    let statistic = 2.0 * (cost(&fit, most) - cost(&model.fit, most));
-    let by_ratio = 0.5 * p_of_chi_square(statistic.max(0.0), 1.0);
-    let (by_run, by_turn) = (differs_from_run_to_run(model), differs_from_turn_to_turn(model));
-    let p_value = (3.0 * by_ratio.min(by_run).min(by_turn)).min(1.0);
-    Some((AugmentedModel { fit, ..model.clone() }, p_value))
+/// The p-value of what turns scatter by beyond the wheels' noise; `None` where the fit without noise of turns
+/// diverges. Where counts are coarse, what they are rounded by grows with turns until a count is full, and
+/// makes turn noise likelier; it is soon over, and no turn differs from another by it.
+fn p_of_turn_scatter(model: &AugmentedModel<'_>) -> Option<f64> {
+    let differ = [differs_from_run_to_run(model), differs_from_turn_to_turn(model)];
+    let without = || {
+        let fit = model.fit.without_noise(NoiseComponent::Turn, &mut terms(&model.candidates)).ok()?;
+        let most = count(&fit).max(count(&model.fit));
+        let statistic = 2.0 * (cost(&fit, most) - cost(&model.fit, most));
+        Some(0.5 * p_of_chi_square(statistic.max(0.0), 1.0))
+    };
+    let by_ratio = if model.fit.depends_on_rounding() { None } else { Some(without()?) };
+    let p_values: Vec<f64> = differ.into_iter().chain(by_ratio).collect();
+    let least = p_values.iter().copied().fold(1.0, f64::min);
+    Some((p_values.len() as f64 * least).min(1.0))
 }

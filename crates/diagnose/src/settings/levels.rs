@@ -26,10 +26,6 @@ pub(crate) const CLUSTER_ROBUST_LEVEL: f64 = 0.05;
 /// Tuned: by hand; no record of what on.
 pub(crate) const TURN_SCATTER_LEVEL: f64 = 1e-7;
 
-/// Probability. Level of the same among simulated runs, where encoders are coarse.
-/// Derived: with Student's quantile of so few simulated runs, 4.7 of their standard deviations.
-pub(crate) const TURN_SCATTER_SIMULATED_LEVEL: f64 = 1e-4;
-
 /// Number. Fewer runs do not tell how runs differ; to be held out, they are cut into blocks.
 /// Tuned: by hand; no record of what on.
 pub(crate) const MIN_RUNS: usize = 6;
