@@ -19,6 +19,7 @@ use super::oracle::{Detectability, Hypotheses, TrueNoise};
 use super::power::DISCRIMINATION_LEVEL;
 use super::robot::{RandomRobot, SessionPlan};
 use crate::error::ChallengeError;
+use crate::fault_aliases::fault_aliases;
 use crate::oracle_view::{OracleView, form_share, has_random_signature, known_noncentrality, size_ratio, view};
 use crate::scope::Scope;
 
@@ -178,7 +179,8 @@ impl Case {
         let plain = cut_into_runs(plain, &stops);
         let noise = TrueNoise::of(&conditions, &instrument_model, mean_square_motion(&plain));
         let (mut detectability, mut rounding_shares) = (Vec::new(), Vec::new());
-        for effect in &mut hidden {
+        let mut fault_aliases_of: Vec<Vec<String>> = vec![Vec::new(); hidden.len()];
+        for (effect, fault_aliases_of) in hidden.iter_mut().zip(&mut fault_aliases_of) {
             // What was driven last, and at which scale: it is asked several things.
             let mut last: Option<(f64, Vec<Dataset>)> = None;
             let mut measured = |effect: &Hidden, noise: TrueNoise, hypotheses: Hypotheses<'_>| {
@@ -191,7 +193,11 @@ impl Case {
                 Ok(found)
             };
             match scale(effect, &mut draw, ratios, |effect, hypotheses| measured(effect, noise, hypotheses))? {
-                Chosen::RecordFault => detectability.push(None),
+                Chosen::RecordFault => {
+                    let driven = drive(&robot.sessions, &measurement, &[effect], false, 0)?;
+                    *fault_aliases_of = fault_aliases(effect.id, &driven, &truth, noise);
+                    detectability.push(None);
+                }
                 Chosen::Detectability(found) => detectability.push(Some(*found)),
                 Chosen::Undetectable => {
                     return Ok(match measured(effect, noise.without_rounding(), Hypotheses::One(effect.id)) {
@@ -219,9 +225,14 @@ impl Case {
         let oracle = hidden
             .iter()
             .enumerate()
-            .map(|(k, effect)| OracleView {
-                rounding_share: rounding_shares[k].filter(|_| effect.kind == EffectKind::Mean),
-                ..view(effect, k, &detectability, both.as_ref(), &hidden)
+            .map(|(k, effect)| {
+                let seen = view(effect, k, &detectability, both.as_ref(), &hidden);
+                let aliases = match effect.kind {
+                    EffectKind::RecordFault => fault_aliases_of[k].clone(),
+                    EffectKind::Mean | EffectKind::Scatter => seen.aliases,
+                };
+                let rounding_share = rounding_shares[k].filter(|_| effect.kind == EffectKind::Mean);
+                OracleView { rounding_share, aliases, ..seen }
             })
             .collect();
         let best = both.as_ref().or(detectability.first().and_then(Option::as_ref));

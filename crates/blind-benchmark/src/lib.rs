@@ -18,6 +18,7 @@ mod cut_log;
 mod draw;
 mod drive;
 mod error;
+mod fault_aliases;
 mod hidden;
 mod instrument;
 mod log_model;

@@ -49,9 +49,8 @@ fn identification_outcome(hidden: &OracleView, first: Option<&Reported>) -> Iden
 
 fn is_aliased(hidden: &OracleView) -> bool {
     match hidden.kind {
-        EffectKind::Mean => !hidden.aliases.is_empty(),
+        EffectKind::Mean | EffectKind::RecordFault => !hidden.aliases.is_empty(),
         EffectKind::Scatter => !hidden.aliases.is_empty() || hidden.ratio.is_none_or(|ratio| ratio < CLEAR_RATIO),
-        EffectKind::RecordFault => false,
     }
 }
 

@@ -187,10 +187,22 @@ pub(crate) fn misfit_of_form(
     noise: TrueNoise,
     terms: &mut [Box<dyn ModelTerm>],
 ) -> f64 {
+    misfit_from(NoiseFree::of(datasets), model, noise, terms)
+}
+
+/// [`misfit_of_form`] without terms of a robot that drives forward or backward, whichever costs less: where
+/// no heading is measured, one may be the other.
+pub(crate) fn misfit_either_way(datasets: &[Dataset], model: &Model, noise: TrueNoise) -> f64 {
+    let of = |heading_rad: f64| {
+        misfit_from(NoiseFree::of(datasets).from_headings(heading_rad), model, noise, &mut [])
+    };
+    of(0.0).min(of(std::f64::consts::PI))
+}
+
+fn misfit_from(mut runs: NoiseFree<'_>, model: &Model, noise: TrueNoise, terms: &mut [Box<dyn ModelTerm>]) -> f64 {
     let columns: Vec<Column> =
         Column::GEOMETRY.into_iter().chain((0..model.term_values.len()).map(Column::Term)).collect();
     let (mut model, mut least) = (model.clone(), f64::INFINITY);
-    let mut runs = NoiseFree::of(datasets);
     for _ in 0..=GAUSS_NEWTON_STEPS {
         runs = runs.with_best_headings(&model, noise, terms);
         let Some(measured) = runs.measurement(&model, noise, terms) else { return least };
@@ -226,6 +238,11 @@ impl<'d> NoiseFree<'d> {
     fn of(datasets: &'d [Dataset]) -> Self {
         let records = records(datasets);
         Self { headings: vec![0.0; records.segments.len()], records }
+    }
+
+    /// The same with one start heading, radians, where none is measured.
+    fn from_headings(self, heading_rad: f64) -> Self {
+        Self { headings: vec![heading_rad; self.headings.len()], ..self }
     }
 
     /// The same with the headings that fit best under a model, from those that they have on.

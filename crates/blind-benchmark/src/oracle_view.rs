@@ -27,7 +27,8 @@ pub struct OracleView {
     /// Noncentrality of the best test between it and each other name whose sizes can be, the least first:
     /// what the other name leaves of it. Empty for gross faults.
     pub rivals: Vec<(String, f64)>,
-    /// The other names that this test does not tell from it with power 0.9.
+    /// The other names that this test does not tell from it with power 0.9; of a gross fault, those whose
+    /// corrections leave as little.
     pub aliases: Vec<String>,
     /// Share of the noncentrality that the rounding of the counts takes; `None` where rounding does not
     /// matter, and of what is no mean.
