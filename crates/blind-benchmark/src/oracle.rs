@@ -193,9 +193,7 @@ pub(crate) fn misfit_of_form(
 /// [`misfit_of_form`] without terms of a robot that drives forward or backward, whichever costs less: where
 /// no heading is measured, one may be the other.
 pub(crate) fn misfit_either_way(datasets: &[Dataset], model: &Model, noise: TrueNoise) -> f64 {
-    let of = |heading_rad: f64| {
-        misfit_from(NoiseFree::of(datasets).from_headings(heading_rad), model, noise, &mut [])
-    };
+    let of = |heading_rad: f64| misfit_from(NoiseFree::of(datasets).starting_at(heading_rad), model, noise, &mut []);
     of(0.0).min(of(std::f64::consts::PI))
 }
 
@@ -241,7 +239,7 @@ impl<'d> NoiseFree<'d> {
     }
 
     /// The same with one start heading, radians, where none is measured.
-    fn from_headings(self, heading_rad: f64) -> Self {
+    fn starting_at(self, heading_rad: f64) -> Self {
         Self { headings: vec![heading_rad; self.headings.len()], ..self }
     }
 
