@@ -9,8 +9,8 @@ use crate::oracle::{TrueNoise, misfit_either_way};
 use crate::power::DISCRIMINATION_LEVEL;
 
 /// The other record faults whose correction of noise-free runs with a hidden one leaves so little more than
-/// its own that the test of two candidates does not discriminate them. To an instrument without headings a robot whose counters are swapped
-/// is one that drives backward with both reversed.
+/// its own that the test of two candidates does not discriminate them. To an instrument without headings a
+/// robot whose counters are swapped is one that drives backward with both reversed.
 pub(crate) fn fault_aliases(
     hidden: &str,
     datasets: &[Dataset],
