@@ -5,8 +5,9 @@ use effects::{CATALOGUE, Hypothesis, hypothesis};
 use estimation::Model;
 use kinematics::DriveGeometry;
 
-use crate::oracle::{TrueNoise, misfit_either_way};
+use crate::oracle::misfit_either_way;
 use crate::power::DISCRIMINATION_LEVEL;
+use crate::true_noise::TrueNoise;
 
 /// The other record faults whose correction of noise-free runs with a hidden one leaves so little more than
 /// its own that the test of two candidates does not discriminate them. To an instrument without headings a

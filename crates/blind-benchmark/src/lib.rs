@@ -24,6 +24,7 @@ mod instrument;
 mod log_model;
 mod measure;
 mod measure_value;
+mod noise_free;
 mod oracle;
 mod oracle_view;
 mod planned;
@@ -37,6 +38,7 @@ mod score;
 mod strata;
 #[cfg(test)]
 mod tests;
+mod true_noise;
 
 use std::collections::BTreeMap;
 use std::ops::Range;

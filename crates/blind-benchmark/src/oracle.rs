@@ -10,18 +10,15 @@
 //! a score test of the variance has (one-sided, so 8.56). Approximate: errors that last are taken as white
 //! ones with the same weight over long times, heavy tails as normal with the same variance.
 
-use dataset::{Dataset, Session};
+use dataset::Dataset;
 use effects::{CATALOGUE, Hypothesis, hypothesis};
-use estimation::{
-    Column, Information, Model, Noise, NormalEquations, OutlierGate, Pass, Records, Segment, Selection, Thinning,
-    inverse, pass_with_innovations, total,
-};
+use estimation::{Column, Information, Model, NormalEquations, inverse};
 use kinematics::{DriveGeometry, Pose, Wheels};
 use model_term::{ModelTerm, TermParameter};
 use nalgebra::{DMatrix, DVector};
 
-use super::conditions::Conditions;
-use super::instrument::{InstrumentModel, TruthKind};
+use super::noise_free::NoiseFree;
+use super::true_noise::TrueNoise;
 
 /// What is known of the geometry parameters before any data, as a share: the tool holds to nominal what it
 /// sees worse.
@@ -61,72 +58,6 @@ pub(crate) struct Detectability {
     free: Vec<usize>,
     /// ½ Σ e², e being the mean squared innovation of a run.
     pub(crate) scatter: f64,
-}
-
-/// The true noise: of the wheels, and of the measured positions and headings.
-///
-/// Rounded counts put the dead-reckoned pose off by half of what both wheels' counts are, and by their
-/// difference over the wheelbase. With q/√12 for each wheel that is J diag(q²/12) Jᵀ: q²/24 along the robot
-/// and q²/(6 b²) in heading; a displacement has it at both ends. It is taken as white errors of the
-/// measurements, the along part in both coordinates. That is a first form: rounding lasts while a count
-/// stands, and on straights at an even speed it is neither uniform nor white. Errors of stamps, of variance
-/// τ², are so too: τ² by the mean square of the speed, half of it in each coordinate, and of the yaw rate.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct TrueNoise {
-    wheel_var_per_m: f64,
-    measurement_var: [f64; 2],
-    rounding_var: [f64; 2],
-}
-
-/// Rounding below this share of all of the variance is none.
-const MIN_ROUNDING_SHARE: f64 = 0.02;
-
-/// The noise of a robot whose counts say nearly all of a turn.
-const MIN_VAR: f64 = 1e-16;
-
-impl TrueNoise {
-    pub(crate) fn of(
-        conditions: &Conditions,
-        instrument_model: &InstrumentModel,
-        [speed_m2_s2, yaw_rate_rad2_s2]: [f64; 2],
-    ) -> Self {
-        let stamps_s2 = conditions.stamp_sigma_s().powi(2);
-        let [xy, theta] = instrument_model.variances();
-        let ends = if instrument_model.kind == TruthKind::Relative { 2.0 } else { 1.0 };
-        let tick_m2 = conditions.tick_m().powi(2);
-        Self {
-            wheel_var_per_m: conditions.wheel_sigma_m_per_sqrt_m.powi(2),
-            measurement_var: [xy + 0.5 * ends * stamps_s2 * speed_m2_s2, theta + ends * stamps_s2 * yaw_rate_rad2_s2],
-            rounding_var: [tick_m2 / 24.0, tick_m2 / (6.0 * conditions.wheel_separation_m.powi(2))]
-                .map(|variance| ends * variance),
-        }
-    }
-
-    /// The same with counts that are not rounded.
-    pub(crate) fn without_rounding(self) -> Self {
-        Self { rounding_var: [0.0; 2], ..self }
-    }
-
-    /// Whether rounding matters beside the other errors.
-    pub(crate) fn has_rounding(self) -> bool {
-        self.rounding_var
-            .iter()
-            .zip(self.measurement_var)
-            .any(|(rounding, other)| *rounding > MIN_ROUNDING_SHARE * other)
-    }
-
-    /// Standard deviation of the heading's rounding over that of its measurements.
-    pub(crate) fn heading_rounding_ratio(self) -> f64 {
-        (self.rounding_var[1] / self.measurement_var[1]).sqrt()
-    }
-
-    fn noise(self) -> Noise {
-        let [xy, theta]: [f64; 2] = std::array::from_fn(|k| self.measurement_var[k] + self.rounding_var[k]);
-        Noise {
-            variance: [self.wheel_var_per_m, MIN_VAR, xy, theta].map(|variance| variance.max(MIN_VAR)),
-            timing_s2: 0.0,
-        }
-    }
 }
 
 /// Half of the χ² of noise-free runs under a model with terms: what the model costs of the log score, on
@@ -209,87 +140,6 @@ fn misfit_from(mut runs: NoiseFree<'_>, model: &Model, noise: TrueNoise, terms: 
         columns.iter().zip(step.iter()).for_each(|(column, by)| model.advance(*column, *by));
     }
     least
-}
-
-/// A pass over noise-free runs.
-struct NoiseFreePass {
-    total: NormalEquations,
-    /// Whitened innovations, each with its run.
-    z: Vec<((usize, usize), f64)>,
-    /// χ² that start headings take up which were not measured.
-    by_headings: f64,
-}
-
-/// Noise-free runs.
-struct NoiseFree<'d> {
-    records: Records<'d>,
-    /// Start headings of segments, radians: those that fit best, where none is measured.
-    headings: Vec<f64>,
-}
-
-/// Start headings are found by so many passes at the most, or until none moves by more.
-const HEADING_PASSES: usize = 4;
-const HEADING_TOLERANCE_RAD: f64 = 1e-9;
-
-impl<'d> NoiseFree<'d> {
-    /// Runs with headings of zero where none is measured.
-    fn of(datasets: &'d [Dataset]) -> Self {
-        let records = records(datasets);
-        Self { headings: vec![0.0; records.segments.len()], records }
-    }
-
-    /// The same with one start heading, radians, where none is measured.
-    fn starting_at(self, heading_rad: f64) -> Self {
-        Self { headings: vec![heading_rad; self.headings.len()], ..self }
-    }
-
-    /// The same with the headings that fit best under a model, from those that they have on.
-    fn with_best_headings(mut self, model: &Model, noise: TrueNoise, terms: &mut [Box<dyn ModelTerm>]) -> Self {
-        if !self.records.segments.iter().any(Segment::has_free_heading) {
-            return self;
-        }
-        for _ in 0..HEADING_PASSES {
-            let pass = self.pass(model, noise, terms);
-            let steps: Vec<(usize, f64)> = pass.heading_steps().collect();
-            steps.iter().for_each(|(segment, step_rad)| self.headings[*segment] += step_rad);
-            if steps.iter().all(|(_, step_rad)| step_rad.abs() <= HEADING_TOLERANCE_RAD) {
-                break;
-            }
-        }
-        self
-    }
-
-    /// Other runs with the headings of these.
-    fn beside<'o>(&self, datasets: &'o [Dataset]) -> Option<NoiseFree<'o>> {
-        let records = records(datasets);
-        (records.segments.len() == self.headings.len()).then(|| NoiseFree { records, headings: self.headings.clone() })
-    }
-
-    fn pass(&self, model: &Model, noise: TrueNoise, terms: &mut [Box<dyn ModelTerm>]) -> Pass {
-        let selections = Selection::of(&self.records, Thinning::NONE, model);
-        pass_with_innovations(
-            &self.records,
-            &selections,
-            model,
-            &noise.noise(),
-            &self.headings,
-            terms,
-            OutlierGate::Off,
-        )
-    }
-
-    fn measurement(&self, model: &Model, noise: TrueNoise, terms: &mut [Box<dyn ModelTerm>]) -> Option<NoiseFreePass> {
-        let pass = self.pass(model, noise, terms);
-        let total = total(&pass.runs)?;
-        let run = |segment: usize| self.records.segments[segment].run;
-        let z = pass.innovations.iter().flatten().map(|found| (run(found.segment), found.z)).collect();
-        Some(NoiseFreePass { total, z, by_headings: pass.chi_square_of_headings() })
-    }
-}
-
-fn records(datasets: &[Dataset]) -> Records<'_> {
-    let sessions: Vec<Session<'_>> = datasets.iter().map(Dataset::session).collect();
-    Records::of(&sessions)
 }
 
 /// Steps of Gauss and Newton to the best geometry.
