@@ -5,8 +5,9 @@
 /// is known to a third, and a p-value of 1e-4 by Student's t needs z = 4.7 in place of 3.7.
 pub(crate) const RESIMULATIONS: u64 = 20;
 
-/// Standard deviations. Where simulated runs are less significant, they count as this: a likelihood ratio of a
-/// variance at its boundary is 0 and its p-value 1 every other time, which is no scatter of the upper tail.
+/// Standard deviations. Where simulated runs are less significant, they count as this: the likelihood ratio
+/// of a variance at its boundary is 0 and its p-value 1 every other time, which is no scatter of the upper
+/// tail.
 /// Derived: a normal variable cut there has a mean of 0.08 and a standard deviation of 0.87.
 pub(crate) const LOWEST_SIMULATED_Z: f64 = -1.0;
 

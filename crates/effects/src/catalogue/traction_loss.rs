@@ -144,7 +144,8 @@ impl Forward for State {
         Hooks { on_run_start: true, floor: true, ..Hooks::NONE }
     }
 
-    /// A robot is put down at rest. At the start of a later motion its wheels stand, but it may be sliding yet.
+    /// A robot is put down at rest. At the start of a later motion its wheels stand, but it may be sliding
+    /// yet.
     fn on_run_start(&mut self, _: &mut RunStart<'_>) {
         self.ground_m_s = Wheels::both(0.0);
         self.sliding = Wheels::both(false);
@@ -354,8 +355,8 @@ mod tests {
             state.floor(&mut step);
             ground_m += if k >= 10_000 { step.travel_m.left } else { 0.0 };
         }
-        // Between v²/2a of the friction at rest and of that when sliding fast. Rejects a robot that the start of
-        // a motion stops, which goes 0.018 m.
+        // Between v²/2a of the friction at rest and of that when sliding fast. Rejects a robot that the start
+        // of a motion stops, which goes 0.018 m.
         let slide_m = |friction: f64| 0.08 / (friction * GRAVITY_M_S2);
         assert!(ground_m > slide_m(0.1) && ground_m < slide_m(0.06), "{ground_m}");
     }
