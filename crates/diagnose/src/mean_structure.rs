@@ -119,7 +119,11 @@ struct MeanSearch<'a> {
 fn search_and_thin<'a>(datasets: &'a [Dataset], base: ModelFit<'a>, catalogue: &[Candidate]) -> MeanSearch<'a> {
     let AmongAll { base, model, autocorrelation } = search_among_all(base, catalogue);
     let spurious = autocorrelation.as_ref().is_some_and(|of| of.spurious);
-    match autocorrelation.filter(|of| of.lasts).and_then(|of| Thinned::of(datasets, base.clone(), of)) {
+    let thinned = autocorrelation.filter(|of| of.lasts).and_then(|of| {
+        let beside = Thinned::beside(&base, &model.found.model, of.clone());
+        beside.or_else(|| Thinned::of(datasets, base.clone(), of))
+    });
+    match thinned {
         Some(thinned) => {
             drop((base, model)); // their fits are large
             thinned.search(catalogue)
@@ -140,6 +144,15 @@ impl<'a> Thinned<'a> {
         Some(Self { base, autocorrelation })
     }
 
+    /// At the spacing at which what is left beside the effects found among all measurements is white.
+    fn beside(base: &ModelFit<'a>, found: &AugmentedModel<'a>, autocorrelation: Autocorrelation) -> Option<Self> {
+        if found.candidates.is_empty() {
+            return None;
+        }
+        let base = base.thinned_beside(&found.fit, &mut terms(&found.candidates))?.ok()?;
+        Some(Self { base, autocorrelation })
+    }
+
     fn search(self, catalogue: &[Candidate]) -> MeanSearch<'a> {
         let Autocorrelation { correlation, spurious, .. } = self.autocorrelation;
         let (base, model) = search_beside_timing_noise(self.base, catalogue);
@@ -156,6 +169,7 @@ struct AmongAll<'a> {
 }
 
 /// Residuals that were autocorrelated beside the effects found among all measurements.
+#[derive(Clone)]
 struct Autocorrelation {
     /// Coefficient, and standard errors.
     correlation: (f64, f64),

@@ -17,6 +17,11 @@ use crate::thinning::{Selection, Thinning};
 impl ModelFit<'_> {
     /// Thins measurements until their innovations are white, or a run has too few left.
     pub(crate) fn thin(&mut self) -> Result<(), EstimationError> {
+        self.thin_beside(&mut [])
+    }
+
+    /// The same of a fit with terms.
+    fn thin_beside(&mut self, terms: &mut [Box<dyn ModelTerm>]) -> Result<(), EstimationError> {
         let Some(between_s) = median_between(&self.records) else { return Ok(()) };
         let mut every_s = between_s;
         // How autocorrelated innovations are depends on no last digit of a fit.
@@ -33,9 +38,9 @@ impl ModelFit<'_> {
                 Some((thinning, selections)) => {
                     every_s *= THINNING_FACTOR;
                     (self.selections, self.thinning) = (Arc::new(selections), thinning);
-                    self.refit_by(&compared, Some(self.current_values()), &mut [])?;
+                    self.refit_by(&compared, Some(self.current_values()), terms)?;
                 }
-                None => self.refit(Some(self.current_values()), &mut [])?,
+                None => self.refit(Some(self.current_values()), terms)?,
             }
         }
     }
@@ -59,6 +64,36 @@ impl ModelFit<'_> {
             thinned.fix_unobservable()?;
             Ok(thinned)
         })
+    }
+
+    /// The fit at the spacing at which the innovations of the same fit with terms are white: what an effect
+    /// does to successive measurements is no error that lasts. `None` where they are white without thinning,
+    /// or where this fit is thinned.
+    ///
+    /// # Errors
+    /// [`EstimationError`] when it diverges.
+    pub fn thinned_beside(
+        &self,
+        with_terms: &Self,
+        terms: &mut [Box<dyn ModelTerm>],
+    ) -> Option<Result<Self, EstimationError>> {
+        let mut beside = Self { displacements_in_series: true, ..with_terms.with_innovations(terms).into_owned() };
+        if self.thinning != Thinning::NONE || beside.is_white() {
+            return None;
+        }
+        let mut fit = || {
+            beside.thin_beside(terms)?;
+            let mut thinned = Self {
+                displacements_in_series: true,
+                selections: Arc::clone(&beside.selections),
+                thinning: beside.thinning,
+                ..self.clone()
+            };
+            thinned.refit(Some(thinned.current_values()), &mut [])?;
+            thinned.fix_unobservable()?;
+            Ok(thinned)
+        };
+        Some(fit())
     }
 
     /// Measurements at a spacing of `every_s`, seconds; `None` when a run has too few left.

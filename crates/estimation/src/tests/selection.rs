@@ -181,6 +181,50 @@ fn a_fit_of_every_measurement_is_thinned_to_the_bits_of_one_that_thins_from_the_
     assert!(every.extended(&mut [Box::new(TravelTerm)]).expect("a fit").thinned_further().is_none());
 }
 
+/// A robot that slides across by a share of its distance.
+#[derive(Clone)]
+struct SidewaysTerm;
+
+impl ModelTerm for SidewaysTerm {
+    fn parameters(&self) -> &'static [TermParameter] {
+        &[TermParameter { name: "share", unit: "1", prior_sigma: 0.01 }]
+    }
+
+    fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
+        gradient[0].y_m = interval.increment().distance_m;
+    }
+}
+
+/// What an effect does to successive measurements is no error that lasts: beside it measurements are thinned
+/// no further than their errors need.
+#[test]
+fn measurements_are_thinned_by_what_is_left_beside_an_effect() {
+    let sliding = |autocorrelation: f64| {
+        let mut dataset = displacement_dataset(&DISPLACEMENTS, autocorrelation, 3);
+        let displacements = dataset.runs.iter_mut().flat_map(|run| &mut run.displacements);
+        displacements.for_each(|displacement| displacement.dy_m += 0.02 * displacement.dx_m);
+        dataset
+    };
+    let terms = || -> Vec<Box<dyn ModelTerm>> { vec![Box::new(SidewaysTerm)] };
+    let every_s = |fit: &ModelFit<'_>| fit.thinning.every_s;
+    let dataset = sliding(0.5);
+    let every = FitSettings::GEOMETRY_ONLY.fit(&[dataset.session()]).expect("a fit");
+    let with_terms = every.extended(&mut terms()).expect("a fit");
+    let beside = every.thinned_beside(&with_terms, &mut terms()).expect("errors last").expect("a fit");
+    let alone = every.clone().thinned_further().expect("a first step").expect("a fit");
+    // Errors of which half lasts a second are white at 4 s. Rejects a spacing at which the effect is white
+    // too, which it is at none.
+    assert!(beside.thinning != Thinning::NONE && every_s(&beside) < every_s(&alone), "{:?}", beside.thinning);
+    assert!(!beside.columns.iter().any(|column| matches!(column, Column::Term(_))), "the effect is not in the fit");
+    assert!(beside.displacements_in_series);
+    // Where nothing lasts beside it, nothing is thinned.
+    let dataset = sliding(0.0);
+    let every = FitSettings::GEOMETRY_ONLY.fit(&[dataset.session()]).expect("a fit");
+    let with_terms = every.extended(&mut terms()).expect("a fit");
+    assert!(every.thinned_beside(&with_terms, &mut terms()).is_none());
+    assert!(every.thinned_further().expect("a first step").expect("a fit").thinning != Thinning::NONE);
+}
+
 /// Nearly the same drive, logged several times as often, by angles that are no multiples of anything: rows
 /// say their rates, and within each second the wheels turn evenly.
 fn logged_finer(dataset: &Dataset, times: usize) -> Dataset {
