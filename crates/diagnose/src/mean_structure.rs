@@ -121,7 +121,13 @@ fn search_and_thin<'a>(datasets: &'a [Dataset], base: ModelFit<'a>, catalogue: &
     let spurious = autocorrelation.as_ref().is_some_and(|of| of.spurious);
     let thinned = autocorrelation.filter(|of| of.lasts).and_then(|of| {
         let beside = Thinned::beside(&base, &model.found.model, of.clone());
-        beside.or_else(|| Thinned::of(datasets, base.clone(), of))
+        let of_base = Thinned::of(datasets, base.clone(), of);
+        // Errors that alternate, as of displacements that share a scan, may show beside the effects alone: wider
+        // than without them nothing is thinned.
+        match (beside, of_base) {
+            (Some(beside), Some(of_base)) if of_base.spacing_s() <= beside.spacing_s() => Some(of_base),
+            (beside, of_base) => beside.or(of_base),
+        }
     });
     match thinned {
         Some(thinned) => {
@@ -151,6 +157,10 @@ impl<'a> Thinned<'a> {
         }
         let base = base.thinned_beside(&found.fit, &mut terms(&found.candidates))?.ok()?;
         Some(Self { base, autocorrelation })
+    }
+
+    const fn spacing_s(&self) -> f64 {
+        self.base.spacing_s()
     }
 
     fn search(self, catalogue: &[Candidate]) -> MeanSearch<'a> {

@@ -96,6 +96,12 @@ impl ModelFit<'_> {
         Some(fit())
     }
 
+    /// Least time between measurements that the fit takes, seconds; 0 where it takes all.
+    #[must_use]
+    pub const fn spacing_s(&self) -> f64 {
+        self.thinning.every_s
+    }
+
     /// Measurements at a spacing of `every_s`, seconds; `None` when a run has too few left.
     fn thinned(&self, every_s: f64, between_s: f64) -> Option<(Thinning, Vec<Selection>)> {
         let thinning = Thinning { every_s: every_s - SPACING_SLACK * between_s, phases: THINNING_PHASES };
