@@ -122,8 +122,8 @@ fn search_and_thin<'a>(datasets: &'a [Dataset], base: ModelFit<'a>, catalogue: &
     let thinned = autocorrelation.filter(|of| of.lasts).and_then(|of| {
         let beside = Thinned::beside(&base, &model.found.model, of.clone());
         let of_base = Thinned::of(datasets, base.clone(), of);
-        // Errors that alternate, as of displacements that share a scan, may show beside the effects alone: wider
-        // than without them nothing is thinned.
+        // Errors that alternate, as of displacements that share a scan, may show beside the effects alone:
+        // wider than without them nothing is thinned.
         match (beside, of_base) {
             (Some(beside), Some(of_base)) if of_base.spacing_s() <= beside.spacing_s() => Some(of_base),
             (beside, of_base) => beside.or(of_base),
