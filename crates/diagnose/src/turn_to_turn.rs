@@ -8,6 +8,7 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use crate::augmented_model::AugmentedModel;
 use crate::candidate::terms;
 use crate::settings::residuals::{TURN_BEGINS_AT, TURN_ENDS_AT, TURNS_PER_RUN};
+use crate::settings::search::DECIMATION_STEP_S;
 use crate::statistics::p_of_chi_square;
 
 /// p-value of a wheelbase that differs so much between turns, were it constant: each turn's score by a share
@@ -20,12 +21,14 @@ use crate::statistics::p_of_chi_square;
 /// variance. Turns of a run beyond a number share the scores of the first ones.
 /// References: Chesher 1984 (the score test of a random coefficient); Satterthwaite 1946.
 pub(crate) fn differs_from_turn_to_turn(model: &AugmentedModel<'_>) -> f64 {
+    let coarse = model.fit.decimated(&mut terms(&model.candidates), DECIMATION_STEP_S);
+    let fit = coarse.as_ref().unwrap_or(&model.fit);
     let mut all = terms(&model.candidates);
     let first = Column::BASE.len() + all.iter().map(|term| term.parameters().len()).sum::<usize>();
     all.push(Box::new(EachTurn::default()));
-    let runs = model.fit.scan_parts(&mut all, &[1; TURNS_PER_RUN]);
+    let runs = fit.scan_parts(&mut all, &[1; TURNS_PER_RUN]);
     let Some(equations) = total(&runs) else { return 1.0 };
-    let Some(projection) = model.fit.eliminated(&equations, &[]) else { return 1.0 };
+    let Some(projection) = fit.eliminated(&equations, &[]) else { return 1.0 };
     let (mut squares, mut mean, mut spread, mut turns) = (0.0, 0.0, 0.0, 0);
     for run in &runs {
         for turn in first..first + TURNS_PER_RUN {
