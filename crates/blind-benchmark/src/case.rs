@@ -180,8 +180,7 @@ impl Case {
         let plain = cut_into_runs(plain, &stops);
         let noise = TrueNoise::of(&conditions, &instrument_model, mean_square_motion(&plain));
         let (mut detectability, mut rounding_shares) = (Vec::new(), Vec::new());
-        let mut fault_aliases_of: Vec<Vec<String>> = vec![Vec::new(); hidden.len()];
-        for (effect, fault_aliases_of) in hidden.iter_mut().zip(&mut fault_aliases_of) {
+        for effect in &mut hidden {
             // What was driven last, and at which scale: it is asked several things.
             let mut last: Option<(f64, Vec<Dataset>)> = None;
             let mut measured = |effect: &Hidden, noise: TrueNoise, hypotheses: Hypotheses<'_>| {
@@ -194,11 +193,7 @@ impl Case {
                 Ok(found)
             };
             match scale(effect, &mut draw, ratios, |effect, hypotheses| measured(effect, noise, hypotheses))? {
-                Chosen::RecordFault => {
-                    let driven = drive(&robot.sessions, &measurement, &[effect], false, 0)?;
-                    *fault_aliases_of = fault_aliases(effect.id, &driven, &truth, noise);
-                    detectability.push(None);
-                }
+                Chosen::RecordFault => detectability.push(None),
                 Chosen::Detectability(found) => detectability.push(Some(*found)),
                 Chosen::Undetectable => {
                     return Ok(match measured(effect, noise.without_rounding(), Hypotheses::One(effect.id)) {
@@ -227,15 +222,15 @@ impl Case {
             .iter()
             .enumerate()
             .map(|(k, effect)| {
-                let seen = view(effect, k, &detectability, both.as_ref(), &hidden);
-                let aliases = match effect.kind {
-                    EffectKind::RecordFault => fault_aliases_of[k].clone(),
-                    EffectKind::Mean | EffectKind::Scatter => seen.aliases,
-                };
-                let rounding_share = rounding_shares[k].filter(|_| effect.kind == EffectKind::Mean);
-                OracleView { rounding_share, aliases, ..seen }
+                let mut view = view(effect, k, &detectability, both.as_ref(), &hidden);
+                view.rounding_share = rounding_shares[k].filter(|_| effect.kind == EffectKind::Mean);
+                if effect.kind == EffectKind::RecordFault {
+                    let driven = drive(&robot.sessions, &measurement, &[effect], false, 0)?;
+                    view.aliases = fault_aliases(effect.id, &driven, &truth, noise);
+                }
+                Ok(view)
             })
-            .collect();
+            .collect::<Result<_, ChallengeError>>()?;
         let best = both.as_ref().or(detectability.first().and_then(Option::as_ref));
         let best_drive = best.map(Detectability::best_drive);
         let datasets = drive(&robot.sessions, &measurement, &all, true, 0)?;

@@ -128,6 +128,7 @@ pub(crate) fn misfit_either_way(datasets: &[Dataset], model: &Model, noise: True
     of(0.0).min(of(std::f64::consts::PI))
 }
 
+/// [`misfit_of_form`] of runs with the start headings that they have.
 fn misfit_from(mut runs: NoiseFree<'_>, model: &Model, noise: TrueNoise, terms: &mut [Box<dyn ModelTerm>]) -> f64 {
     let columns: Vec<Column> =
         Column::GEOMETRY.into_iter().chain((0..model.term_values.len()).map(Column::Term)).collect();

@@ -11,7 +11,7 @@ use crate::settings::search::MAX_CANCELLATION;
 
 /// Whether effects of a model only cancel each other: each given the other is significant, and on any driving
 /// but that which was recorded their difference is another.
-pub(crate) fn cancel(model: &AugmentedModel<'_>) -> bool {
+pub(crate) fn effects_cancel(model: &AugmentedModel<'_>) -> bool {
     cancellation(model) > MAX_CANCELLATION
 }
 

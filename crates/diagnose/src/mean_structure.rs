@@ -119,17 +119,8 @@ struct MeanSearch<'a> {
 fn search_and_thin<'a>(datasets: &'a [Dataset], base: ModelFit<'a>, catalogue: &[Candidate]) -> MeanSearch<'a> {
     let AmongAll { base, model, autocorrelation } = search_among_all(base, catalogue);
     let spurious = autocorrelation.as_ref().is_some_and(|of| of.spurious);
-    let thinned = autocorrelation.filter(|of| of.lasts).and_then(|of| {
-        let beside = Thinned::beside(&base, &model.found.model, of.clone());
-        let of_base = Thinned::of(datasets, base.clone(), of);
-        // Errors that alternate, as of displacements that share a scan, may show beside the effects alone:
-        // wider than without them nothing is thinned.
-        match (beside, of_base) {
-            (Some(beside), Some(of_base)) if of_base.spacing_s() <= beside.spacing_s() => Some(of_base),
-            (beside, of_base) => beside.or(of_base),
-        }
-    });
-    match thinned {
+    let lasting = autocorrelation.filter(|of| of.lasts);
+    match lasting.and_then(|of| Thinned::beside(datasets, &base, &model.found.model, of)) {
         Some(thinned) => {
             drop((base, model)); // their fits are large
             thinned.search(catalogue)
@@ -144,23 +135,32 @@ struct Thinned<'a> {
     autocorrelation: Autocorrelation,
 }
 
+/// A base fit, thinned until what it leaves is white.
+fn thinned<'a>(datasets: &'a [Dataset], base: ModelFit<'a>) -> Option<ModelFit<'a>> {
+    base.thinned_further().unwrap_or_else(|| THINNED.fit(&sessions(datasets))).ok()
+}
+
 impl<'a> Thinned<'a> {
+    /// At the spacing at which what the base fit leaves is white.
     fn of(datasets: &'a [Dataset], base: ModelFit<'a>, autocorrelation: Autocorrelation) -> Option<Self> {
-        let base = base.thinned_further().unwrap_or_else(|| THINNED.fit(&sessions(datasets))).ok()?;
-        Some(Self { base, autocorrelation })
+        Some(Self { base: thinned(datasets, base)?, autocorrelation })
     }
 
-    /// At the spacing at which what is left beside the effects found among all measurements is white.
-    fn beside(base: &ModelFit<'a>, found: &AugmentedModel<'a>, autocorrelation: Autocorrelation) -> Option<Self> {
-        if found.candidates.is_empty() {
-            return None;
-        }
-        let base = base.thinned_beside(&found.fit, &mut terms(&found.candidates))?.ok()?;
+    /// At the spacing at which what is left beside the effects found among all measurements is white, where
+    /// that is less. Errors that alternate, as of displacements that share a scan, may show beside the
+    /// effects alone: wider than without them nothing is thinned.
+    fn beside(
+        datasets: &'a [Dataset],
+        base: &ModelFit<'a>,
+        found: &AugmentedModel<'a>,
+        autocorrelation: Autocorrelation,
+    ) -> Option<Self> {
+        let has_effects = !found.candidates.is_empty();
+        let beside =
+            has_effects.then(|| base.thinned_beside(&found.fit, &mut terms(&found.candidates))?.ok()).flatten();
+        let each = [thinned(datasets, base.clone()), beside];
+        let base = each.into_iter().flatten().min_by(|a, b| a.spacing_s().total_cmp(&b.spacing_s()))?;
         Some(Self { base, autocorrelation })
-    }
-
-    const fn spacing_s(&self) -> f64 {
-        self.base.spacing_s()
     }
 
     fn search(self, catalogue: &[Candidate]) -> MeanSearch<'a> {
@@ -179,7 +179,6 @@ struct AmongAll<'a> {
 }
 
 /// Residuals that were autocorrelated beside the effects found among all measurements.
-#[derive(Clone)]
 struct Autocorrelation {
     /// Coefficient, and standard errors.
     correlation: (f64, f64),

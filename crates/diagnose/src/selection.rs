@@ -3,7 +3,7 @@
 use estimation::ModelFit;
 
 use crate::augmented_model::AugmentedModel;
-use crate::cancellation::cancel;
+use crate::cancellation::effects_cancel;
 use crate::candidate::Candidate;
 use crate::fit_cache::FitCache;
 use crate::gain::gain;
@@ -99,8 +99,8 @@ fn without_what_cancels<'a>(
         })
         .collect();
     let all: Vec<&'static str> = model.candidates.iter().map(Candidate::id).collect();
-    subsets.retain(|subset| !cancel(subset));
-    let all_cancel = cancel(&model);
+    subsets.retain(|subset| !effects_cancel(subset));
+    let all_cancel = effects_cancel(&model);
     // A single effect cancels nothing, but may have no fit of its own.
     if !all_cancel || subsets.is_empty() {
         subsets.push(model);

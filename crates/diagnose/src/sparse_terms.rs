@@ -5,7 +5,7 @@ use estimation::ModelFit;
 use kinematics::Side;
 
 use crate::augmented_model::{AugmentedModel, refit, refit_each};
-use crate::cancellation::cancel;
+use crate::cancellation::effects_cancel;
 use crate::candidate::Candidate;
 use crate::covariates::{of_cycles, of_runs};
 use crate::gain::gain;
@@ -194,7 +194,7 @@ impl<'m, 'a> SparseSearch<'m, 'a> {
         }
         let with = |scored: &Scored| {
             refit(base, model, [&model.candidates[..], std::slice::from_ref(&scored.candidate)].concat())
-                .filter(|extended| keeps_wheels(&model.fit, &extended.fit) && !cancel(extended))
+                .filter(|extended| keeps_wheels(&model.fit, &extended.fit) && !effects_cancel(extended))
         };
         Some(Self { model, p_value, trials, refitted: refit_each(&scored[..MAX_SPARSE_REFITS.min(trials)], with) })
     }

@@ -66,6 +66,23 @@ pub(crate) fn p_of_chi_square(statistic: f64, freedom: f64) -> f64 {
     ChiSquared::new(freedom.max(1.0)).map_or(1.0, |chi| chi.sf(statistic.max(0.0)))
 }
 
+/// p-value of independent scores that differ so much, each with its variance. Σ u² is a weighted sum of χ²
+/// variables, approximated by one χ² of the same mean and variance (Satterthwaite 1946); 1 of fewer than
+/// three scores.
+pub(crate) fn p_of_differing_scores(scores: impl Iterator<Item = (f64, f64)>) -> f64 {
+    let (mut squares, mut mean, mut spread, mut count) = (0.0, 0.0, 0.0, 0);
+    for (score, variance) in scores {
+        squares += score * score;
+        mean += variance;
+        spread += variance * variance;
+        count += 1;
+    }
+    if count < 3 || mean <= 0.0 {
+        return 1.0;
+    }
+    p_of_chi_square(squares * mean / spread, mean * mean / spread)
+}
+
 /// Two-sided p-value of a normal variable.
 pub(crate) fn p_of_z(z: f64) -> f64 {
     Normal::new(0.0, 1.0).map_or(1.0, |normal| 2.0 * normal.sf(z.abs()))
@@ -129,6 +146,17 @@ pub(crate) fn holm(p: &[f64], level: f64) -> Vec<bool> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn scores_that_differ_are_judged_by_their_own_variances() {
+        let p = |scores: &[(f64, f64)]| p_of_differing_scores(scores.iter().copied());
+        // Of one variance v, Σ u²/v is χ² of as many: 12/2 of three. Rejects squares that are not over it.
+        assert!((p(&[(2.0, 2.0); 3]) - p_of_chi_square(6.0, 3.0)).abs() < 1e-15);
+        // Variances 4, 1, 1: mean 6, spread 18, Σ u² = 18: χ² of 36/18 with 18 · 6/18.
+        assert!((p(&[(4.0, 4.0), (1.0, 1.0), (1.0, 1.0)]) - p_of_chi_square(6.0, 2.0)).abs() < 1e-15);
+        // Two scores do not differ from each other by a scatter of their own.
+        assert_eq!((p(&[(9.0, 1.0); 2]), p(&[(0.0, 0.0); 3])), (1.0, 1.0));
+    }
 
     #[test]
     fn regress_the_quantile_of_many_degrees_of_freedom_is_the_normal_one() {

@@ -9,7 +9,7 @@ use crate::augmented_model::AugmentedModel;
 use crate::candidate::terms;
 use crate::settings::residuals::{TURN_BEGINS_AT, TURN_ENDS_AT, TURNS_PER_RUN};
 use crate::settings::search::DECIMATION_STEP_S;
-use crate::statistics::p_of_chi_square;
+use crate::statistics::p_of_differing_scores;
 
 /// p-value of a wheelbase that differs so much between turns, were it constant: each turn's score by a share
 /// of its own, which the turn is larger by, with the score's variance.
@@ -17,35 +17,26 @@ use crate::statistics::p_of_chi_square;
 /// What is drawn anew for each motion, as where on its patch a tyre touches, errs in proportion to the turn
 /// and lasts as long. The noise of turns, which grows with their root, is fitted to it, and its increments
 /// are independent within a turn where these are not. With u_t the score, what is fitted projected out, and
-/// V_t its variance, Σ u_t² is a weighted sum of χ² variables, approximated by one χ² of the same mean and
-/// variance. Turns of a run beyond a number share the scores of the first ones.
-/// References: Chesher 1984 (the score test of a random coefficient); Satterthwaite 1946.
+/// V_t its variance, Σ u_t² is larger than Σ V_t. Turns of a run beyond a number share the scores of the
+/// first ones.
+/// Reference: Chesher 1984 (the score test of a random coefficient).
 pub(crate) fn differs_from_turn_to_turn(model: &AugmentedModel<'_>) -> f64 {
     let coarse = model.fit.decimated(&mut terms(&model.candidates), DECIMATION_STEP_S);
     let fit = coarse.as_ref().unwrap_or(&model.fit);
     let mut all = terms(&model.candidates);
-    let first = Column::BASE.len() + all.iter().map(|term| term.parameters().len()).sum::<usize>();
     all.push(Box::new(EachTurn::default()));
+    let first = fit.solution.model.term_values.len();
+    let columns = || (first..first + TURNS_PER_RUN).map(|turn| Column::Term(turn).index());
     let runs = fit.scan_parts(&mut all, &[1; TURNS_PER_RUN]);
     let Some(equations) = total(&runs) else { return 1.0 };
     let Some(projection) = fit.eliminated(&equations, &[]) else { return 1.0 };
-    let (mut squares, mut mean, mut spread, mut turns) = (0.0, 0.0, 0.0, 0);
-    for run in &runs {
-        for turn in first..first + TURNS_PER_RUN {
-            let projected = projection.of_columns(run, &[turn]);
-            let variance = projected.information[(0, 0)];
-            if variance > 0.0 {
-                squares += projected.gradient[0].powi(2);
-                mean += variance;
-                spread += variance * variance;
-                turns += 1;
-            }
-        }
-    }
-    if turns < 3 || mean <= 0.0 {
-        return 1.0;
-    }
-    p_of_chi_square(squares * mean / spread, mean * mean / spread)
+    let turns = runs.iter().flat_map(|run| columns().map(move |column| (run, column)));
+    let scores = turns.map(|(run, column)| {
+        let projected = projection.of_columns(run, &[column]);
+        (projected.gradient[0], projected.information[(0, 0)])
+    });
+    // A turn that was not driven, or not measured, has no score.
+    p_of_differing_scores(scores.filter(|(_, variance)| *variance > 0.0))
 }
 
 /// A share of each turn of a run: by so much of itself the turn is larger than the counts say.

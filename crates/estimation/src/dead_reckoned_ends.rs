@@ -168,16 +168,6 @@ impl ModelFit<'_> {
         Ok(without)
     }
 
-    /// The fit, with its terms, to the runs of another fit of the same selections.
-    ///
-    /// # Errors
-    /// [`EstimationError`] when it diverges.
-    pub fn on_runs_of(&self, other: &Self, terms: &mut [Box<dyn ModelTerm>]) -> Result<Self, EstimationError> {
-        let mut again = Self { records: Arc::clone(&other.records), ..self.clone() };
-        again.refit(Some(self.current_values()), terms)?;
-        Ok(again)
-    }
-
     /// Dead reckoning of every segment from its first measurement to its last under a model with terms;
     /// segments without measured headings are left out.
     #[must_use]

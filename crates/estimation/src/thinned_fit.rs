@@ -78,10 +78,8 @@ impl ModelFit<'_> {
         terms: &mut [Box<dyn ModelTerm>],
     ) -> Option<Result<Self, EstimationError>> {
         let mut beside = Self { displacements_in_series: true, ..with_terms.with_innovations(terms).into_owned() };
-        if self.thinning != Thinning::NONE || beside.is_white() {
-            return None;
-        }
-        let mut fit = || {
+        let is_to_thin = self.thinning == Thinning::NONE && !beside.is_white();
+        is_to_thin.then(|| {
             beside.thin_beside(terms)?;
             let mut thinned = Self {
                 displacements_in_series: true,
@@ -92,8 +90,7 @@ impl ModelFit<'_> {
             thinned.refit(Some(thinned.current_values()), &mut [])?;
             thinned.fix_unobservable()?;
             Ok(thinned)
-        };
-        Some(fit())
+        })
     }
 
     /// Least time between measurements that the fit takes, seconds; 0 where it takes all.
