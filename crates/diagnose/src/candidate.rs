@@ -1,6 +1,7 @@
-//! What can be named: the catalogue's mean terms and sparse terms, as the likelihood takes them.
+//! What can be tested: the catalogue's mean terms, sparse terms, and deviations from the form of either, as the
+//! likelihood takes them.
 
-use effects::{CATALOGUE, Hypothesis, OnBoard, Sparse, hypothesis};
+use effects::{CATALOGUE, Covariate, Description, Hypothesis, OnBoard, Sparse, hypothesis};
 use model_term::{ModelTerm, TermParameter};
 
 use crate::cause::Cause;
@@ -12,9 +13,25 @@ pub(crate) enum Candidate {
     Effect { id: &'static str, variant: usize, at: Option<f64> },
     /// A product of covariates on one channel.
     Sparse(Sparse),
+    /// A deviation from the form of another candidate at its sizes, with a covariate. It is tested, and named by
+    /// nothing.
+    Deviation { of: Box<Self>, sizes: Vec<f64>, by: Covariate },
 }
 
 impl Candidate {
+    /// The effect of the catalogue that it is.
+    const fn effect(&self) -> Option<&'static str> {
+        match self {
+            Self::Effect { id, .. } => Some(id),
+            Self::Sparse(_) | Self::Deviation { .. } => None,
+        }
+    }
+
+    /// What is known of the effect of the catalogue that it is.
+    fn description(&self) -> Option<Description> {
+        effects::description(self.effect()?)
+    }
+
     /// The term, at the start of its life; `None` only for a variant that the catalogue does not have.
     pub(crate) fn term(&self) -> Option<Box<dyn ModelTerm>> {
         match self {
@@ -25,23 +42,18 @@ impl Candidate {
                 })
             }
             Self::Sparse(sparse) => Some(sparse.term()),
+            Self::Deviation { of, sizes, by } => Some(effects::modulated(of.term()?, sizes.clone(), by.clone())),
         }
     }
 
     /// The id of the effect, or `unlisted`.
-    pub(crate) const fn id(&self) -> &'static str {
-        match self {
-            Self::Effect { id, .. } => id,
-            Self::Sparse(_) => "unlisted",
-        }
+    pub(crate) fn id(&self) -> &'static str {
+        self.effect().unwrap_or("unlisted")
     }
 
     /// It as a cause; of a product its term is not known before it is estimated.
-    pub(crate) const fn cause(&self) -> Cause {
-        match self {
-            Self::Effect { id, .. } => Cause::Effect(id),
-            Self::Sparse(_) => Cause::Unknown,
-        }
+    pub(crate) fn cause(&self) -> Cause {
+        self.effect().map_or(Cause::Unknown, Cause::Effect)
     }
 
     /// Whether both are the same effect of the catalogue, perhaps in two of its variants.
@@ -51,34 +63,29 @@ impl Candidate {
 
     /// How the records' stamps are without it, where it is in the stamps alone.
     pub(crate) fn restamped(&self) -> Option<effects::Restamped> {
-        match self {
-            Self::Effect { id, .. } => effects::description(id)?.restamped,
-            Self::Sparse(_) => None,
-        }
+        self.description()?.restamped
     }
 
     /// Its estimate by counts alone, where it is in the stamps alone.
     pub(crate) fn shown_by_counts(&self) -> Option<effects::ShownByCounts> {
-        match self {
-            Self::Effect { id, .. } => effects::description(id)?.shown_by_counts,
-            Self::Sparse(_) => None,
-        }
+        self.description()?.shown_by_counts
     }
 
     /// Whether it is of the outside instrument, and no part of the robot's motion.
     pub(crate) fn is_of_instrument(&self) -> bool {
         match self {
-            Self::Effect { id, .. } => effects::description(id)
-                .is_some_and(|description| matches!(description.on_board, OnBoard::OfInstrument)),
+            Self::Effect { .. } => {
+                self.description().is_some_and(|description| matches!(description.on_board, OnBoard::OfInstrument))
+            }
             Self::Sparse(sparse) => sparse.channel.is_of_instrument(),
+            Self::Deviation { of, .. } => of.is_of_instrument(),
         }
     }
 
     /// Whether its form is known exactly: what an instrument and the clocks do is, and what a wheel, a floor
     /// or a castor does is not.
     pub(crate) fn has_exact_form(&self) -> bool {
-        let is_clock_rate = |id| effects::description(id).is_some_and(|description| description.is_clock_rate);
-        self.is_of_instrument() || matches!(self, Self::Effect { id, .. } if is_clock_rate(id))
+        self.is_of_instrument() || self.description().is_some_and(|description| description.is_clock_rate)
     }
 
     /// Its held variant parameters.
@@ -91,7 +98,7 @@ impl Candidate {
                 }
                 fixed
             }
-            Self::Sparse(_) => Vec::new(),
+            Self::Sparse(_) | Self::Deviation { .. } => Vec::new(),
         }
     }
 
@@ -108,7 +115,7 @@ impl Candidate {
     pub(crate) fn moved_to(&self, value: f64) -> Self {
         match self {
             Self::Effect { id, variant, .. } => Self::Effect { id, variant: *variant, at: Some(value) },
-            Self::Sparse(_) => self.clone(),
+            Self::Sparse(_) | Self::Deviation { .. } => self.clone(),
         }
     }
 
@@ -129,7 +136,7 @@ pub(crate) fn batched_terms<'c>(candidates: impl Iterator<Item = &'c Candidate>)
     let of_chunk = |chunk: &[&Candidate]| {
         let sparse = chunk.iter().filter_map(|candidate| match candidate {
             Candidate::Sparse(sparse) => Some(sparse.clone()),
-            Candidate::Effect { .. } => None,
+            Candidate::Effect { .. } | Candidate::Deviation { .. } => None,
         });
         if product(&chunk[0]) { Sparse::batched(&sparse.collect::<Vec<_>>()) } else { chunk[0].term() }
     };

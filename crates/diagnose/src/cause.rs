@@ -1,5 +1,7 @@
 //! Causes of what a calibrated model gets wrong, what they were found by, and why one is not alone.
 
+use effects::Covariate;
+
 use crate::check::{Check, ResidualPersistence};
 use crate::document::UnlistedTerm;
 use crate::geometry_deviation::GeometryDeviation;
@@ -75,12 +77,14 @@ impl Basis {
 }
 
 /// Why a cause is not alone.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Doubt {
     /// One uncatalogued term explains the data as well.
     TermDoesAsWell,
     /// Something is left that it does not explain.
     Incomplete,
+    /// In the data its size changes with this covariate, which that of such an effect does not.
+    OtherForm(Covariate),
     /// Other unmodelled effects of turns scatter like it.
     ScattersAlike,
     /// It is of low significance.

@@ -91,6 +91,7 @@ pub(crate) fn scenario_of(
                 terms.push(EstimatedTerm { kind: (*id).to_owned(), values });
                 simulated(id, &estimates)?
             }
+            Candidate::Deviation { .. } => return Err("a deviation from a form has no simulation model".to_owned()),
             Candidate::Sparse(sparse) => {
                 Effect::Term(SparseTerm::new(sparse, fitted.iter().sum(), values_of_runs(sparse, model)))
             }

@@ -12,6 +12,7 @@ use crate::cause::{Basis, Cause, Doubt};
 use crate::check::{Check, TestResult};
 use crate::clock_offsets::ClockOffset;
 use crate::document::{UnlistedTerm, Value};
+use crate::form_deviation::FormDeviation;
 use crate::geometry_deviation::GeometryDeviation;
 use crate::model_comparison::relative_odds;
 use crate::record_faults::Fault;
@@ -229,15 +230,28 @@ pub(crate) fn beside_unlisted(findings: &mut [Finding], odds: f64) {
     }
 }
 
+/// The odds of an uncatalogued cause over those named, by a p-value beside these. A p-value speaks against its
+/// hypothesis by no more than 1/(−e p ln p) (Sellke, Bayarri & Berger 2001).
+fn uncatalogued_odds(p_value: f64) -> f64 {
+    let bayes_factor_bound = (-std::f64::consts::E * p_value * p_value.max(f64::MIN_POSITIVE).ln()).recip();
+    (bayes_factor_bound * UNCATALOGUED_PRIOR / (1.0 - UNCATALOGUED_PRIOR)).min(1.0)
+}
+
+/// Doubts an effect whose form is off significantly, and by more than is known of it.
+pub(crate) fn or_of_other_form(finding: &mut Finding, deviation: FormDeviation, has_exact_form: bool) {
+    let FormDeviation { share, p_value, by } = deviation;
+    if p_value < LACK_OF_FIT_LEVEL && (has_exact_form || share > MODEL_MISMATCH_FRACTION) {
+        finding.or_unlisted(uncatalogued_odds(p_value), Doubt::OtherForm(by));
+    }
+}
+
 /// Doubts effects that no other doubt is on, where the score of an uncatalogued term is significant beside
-/// them by more than the error of their form. A p-value speaks against its hypothesis by no more than 1/(−e
-/// p ln p) (Sellke, Bayarri & Berger 2001).
+/// them by more than the error of their form.
 pub(crate) fn or_incomplete(findings: &mut [Finding], (score, p_value): (f64, f64)) {
     if p_value >= LACK_OF_FIT_LEVEL {
         return;
     }
-    let bayes_factor_bound = (-std::f64::consts::E * p_value * p_value.max(f64::MIN_POSITIVE).ln()).recip();
-    let odds = (bayes_factor_bound * UNCATALOGUED_PRIOR / (1.0 - UNCATALOGUED_PRIOR)).min(1.0);
+    let odds = uncatalogued_odds(p_value);
     let is_incomplete =
         |finding: &&mut Finding| finding.is_certain() && score > MODEL_MISMATCH_FRACTION * finding.z.powi(2);
     for finding in findings.iter_mut().filter(is_incomplete) {

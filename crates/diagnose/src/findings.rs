@@ -11,6 +11,7 @@ use crate::check::TestResult;
 use crate::clock_offsets::ClockOffset;
 use crate::finding;
 use crate::finding::Finding;
+use crate::form_deviation::form_deviation;
 use crate::geometry_deviations::remaining_deviations;
 use crate::map_errors::without_map_errors;
 use crate::mean_lateness::join_clock;
@@ -70,7 +71,7 @@ type Stage = fn(&StageResults<'_, '_>, Vec<Finding>) -> Vec<Finding>;
 
 /// The findings, record faults first, then by significance.
 pub(crate) fn findings(results: &StageResults<'_, '_>) -> Vec<Finding> {
-    let stages: [Stage; 18] = [
+    let stages: [Stage; 19] = [
         record_faults,
         mean_effects,
         clocks,
@@ -83,6 +84,7 @@ pub(crate) fn findings(results: &StageResults<'_, '_>) -> Vec<Finding> {
         failed_checks,
         without_errors_of_form,
         doubt_parts_of_stronger_findings,
+        doubt_other_forms,
         doubt_incomplete_models,
         doubt_low_significance,
         doubt_what_does_not_carry_over,
@@ -217,6 +219,18 @@ fn without_errors_of_form(results: &StageResults<'_, '_>, mut findings: Vec<Find
 fn doubt_parts_of_stronger_findings(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
     let full = results.structure.found.model.candidates.len() >= MAX_EFFECTS;
     finding::doubt(&mut findings[results.faults.len()..], full);
+    findings
+}
+
+/// Effects whose data have another form than they have.
+fn doubt_other_forms(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    let model = results.structure.model();
+    for finding in findings.iter_mut().filter(|finding| finding.is_certain()) {
+        let term = finding.term.and_then(|index| Some((form_deviation(model, index)?, &model.candidates[index])));
+        if let Some((deviation, candidate)) = term {
+            finding::or_of_other_form(finding, deviation, candidate.has_exact_form());
+        }
+    }
     findings
 }
 

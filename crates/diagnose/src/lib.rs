@@ -26,6 +26,7 @@ mod extended_scenario;
 mod finding;
 mod findings;
 mod fit_cache;
+mod form_deviation;
 mod gain;
 mod geometry_deviation;
 mod geometry_deviations;

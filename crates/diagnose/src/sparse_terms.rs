@@ -187,7 +187,7 @@ impl<'m, 'a> SparseSearch<'m, 'a> {
     /// score at a level.
     pub(crate) fn beside(level: f64, base: &ModelFit<'a>, model: &'m AugmentedModel<'a>) -> Option<Self> {
         // No finding is asked for at a higher level.
-        let (scored, p_value) = best_first(base, model, SPARSE_TERM_LEVEL)?;
+        let (scored, p_value) = best_first(model, &library(base), SPARSE_TERM_LEVEL)?;
         let trials = scored.len();
         if p_value > level {
             return None;
@@ -244,16 +244,19 @@ impl<'m, 'a> SparseSearch<'m, 'a> {
 
 /// Score of the best sparse term beside a model, and its p-value; `None` where no term is detectable.
 pub(crate) fn lack_of_fit(base: &ModelFit<'_>, model: &AugmentedModel<'_>) -> Option<(f64, f64)> {
-    let (scored, p_value) = best_first(base, model, LACK_OF_FIT_LEVEL)?;
+    let (scored, p_value) = best_first(model, &library(base), LACK_OF_FIT_LEVEL)?;
     Some((scored.first()?.statistic, p_value))
 }
 
-/// Sparse terms by their scores beside a model, the best first, and its p-value; `None` where none is
+/// The terms of a library by their scores beside a model, the best first, and its p-value; `None` where none is
 /// detectable. Coarse encoders are asked where it is significant at a level without them.
-fn best_first(base: &ModelFit<'_>, model: &AugmentedModel<'_>, level: f64) -> Option<(Vec<Scored>, f64)> {
-    let library = library(base);
+pub(crate) fn best_first(
+    model: &AugmentedModel<'_>,
+    library: &[Candidate],
+    level: f64,
+) -> Option<(Vec<Scored>, f64)> {
     let mut scored: Vec<Scored> =
-        scan(&model.fit, &model.candidates, &library).into_iter().filter(|scored| scored.dimensions > 0).collect();
+        scan(&model.fit, &model.candidates, library).into_iter().filter(|scored| scored.dimensions > 0).collect();
     scored.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
     let best = (2 * MAX_SPARSE_REFITS).min(scored.len());
     let unresolved = unresolved(&model.fit, &model.candidates, &scored[..best]);

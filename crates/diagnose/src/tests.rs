@@ -11,6 +11,7 @@ use crate::candidate::{Candidate, mean_terms};
 use crate::detectability::detectability;
 use crate::extended_scenario::SamplingStatistics;
 use crate::fit_cache::FitCache;
+use crate::form_deviation::form_deviation;
 use crate::gain::gain_by_level;
 use crate::geometry_deviations::{keeps_wheels, remaining_deviations};
 use crate::model_comparison::{form_error_statistic, log_bayes_factor, margin_over_units};
@@ -84,6 +85,7 @@ fn asked(datasets: &[Dataset]) -> String {
     let checked = check(&model);
     line("checks", &(checked.checks, checked.correlation, checked.outliers, checked.autocorrelated));
     line("lack of fit", &lack_of_fit(&base, &of_latency));
+    line("form", &form_deviation(&of_latency, 0));
     // Profiles of residuals are long, and those of one robot go through what makes all.
     if datasets.len() == 1 && datasets[0].robot.ticks_per_rev.is_none() {
         line("residuals", &residuals(&base, &model));

@@ -132,6 +132,10 @@ fn sentence(finding: &Finding) -> String {
             }
             Doubt::TermDoesAsWell => format!("{sentence}; a term that is not in the catalogue explains it as well"),
             Doubt::Incomplete => format!("{sentence}; it does not explain all that is there"),
+            Doubt::OtherForm(by) => {
+                let by = by.name();
+                format!("{sentence}; its size changes with {by}, which it should not: it may be something else")
+            }
             Doubt::ScattersAlike => format!("{sentence}; other effects that differ from turn to turn scatter alike"),
             Doubt::LowSignificance => format!("{sentence}; its significance is low, and it may be something else"),
             Doubt::OtherGeometry => {

@@ -42,7 +42,7 @@ pub use hypothesis::{Hypothesis, RecordCorrection, Sign, Variant};
 pub use on_board::{Code, Correction, Input, IntervalScatter, OnBoard, RawInterval, Scatter, ScatterModel, SizeOf};
 pub use stream::{Address, Stream, StreamName};
 pub use stream_lanes::{NormalTable, StreamLanes, StreamsLanes};
-pub use term::{Sparse, SparseTerm};
+pub use term::{Sparse, SparseTerm, modulated};
 
 /// Declares the catalogue: for each effect its module and its parameters' type.
 macro_rules! contents {

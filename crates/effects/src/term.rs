@@ -26,11 +26,13 @@ use crate::forward::{Forward, Hooks, PoseReading, RunStart, Step};
 use crate::hypothesis::{Hypothesis, Variant};
 use crate::motion_history::{MotionHistory, MotionHistoryTracker};
 use crate::on_board::OnBoard;
+use modulated::Modulated;
 use product_batch::ProductBatch;
 use recorded::{OfRows, ROW_SHARE, Recorded};
 pub use sparse::Sparse;
 use sparse::{CONSTANT, on_channel, parameter, seen};
 
+mod modulated;
 mod product_batch;
 mod recorded;
 mod sparse;
@@ -58,6 +60,14 @@ impl Sparse {
     pub fn batched(all: &[Self]) -> Option<Box<dyn ModelTerm>> {
         all.iter().all(Self::shares_samples).then(|| Box::new(ProductBatch::new(all)) as Box<dyn ModelTerm>)
     }
+}
+
+/// By how much a term's form is off with a covariate: the term at given sizes times the covariate. The parameter is
+/// the deviation relative to the term, for each unit of the covariate; `sizes` are as many as the term has
+/// parameters.
+#[must_use]
+pub fn modulated(term: Box<dyn ModelTerm>, sizes: Vec<f64>, by: Covariate) -> Box<dyn ModelTerm> {
+    Box::new(Modulated::new(term, sizes, by))
 }
 
 /// A term of a given size, for the simulator.

@@ -1,5 +1,7 @@
 //! Findings on paper: causes, probabilities, doubts.
 
+use effects::Covariate;
+
 use super::*;
 
 const SLIP: Cause = Cause::Effect("slip_speed");
@@ -223,6 +225,23 @@ fn what_is_left_beside_an_effect_doubts_it_by_the_bound_of_its_p_value() {
     assert!(is_near(doubted(30.0, 0.0).expect("in doubt"), 0.45));
     // Above the level, and no more than a hundredth of the effect's own z² = 100.
     assert!(doubted(30.0, 0.05).is_none() && doubted(1.0, 0.01).is_none() && doubted(1.01, 0.01).is_some());
+}
+
+#[test]
+fn an_effect_whose_size_changes_with_what_it_should_not_is_doubted_beyond_what_is_known_of_its_form() {
+    let doubted = |share: f64, p_value: f64, has_exact_form: bool| {
+        let mut finding = found(10.0, &[SLIP]);
+        or_of_other_form(&mut finding, FormDeviation { share, p_value, by: Covariate::RunTime }, has_exact_form);
+        assert!(finding.doubts.is_empty() || finding.doubts == [Doubt::OtherForm(Covariate::RunTime)]);
+        finding.has_unlisted().then_some(finding.probability)
+    };
+    // By the bound of its p-value, as above.
+    let odds = (std::f64::consts::E * 0.01 * 100_f64.ln()).recip() / 19.0;
+    assert!(is_near(doubted(0.2, 0.01, false).expect("in doubt"), 0.9 / (1.0 + odds)));
+    assert!(is_near(doubted(0.2, 1e-12, true).expect("in doubt"), 0.45));
+    // A hundredth may be the error of a form, but of no instrument's.
+    assert!(doubted(0.01, 1e-12, false).is_none() && doubted(0.011, 1e-12, false).is_some());
+    assert!(doubted(0.001, 1e-12, true).is_some() && doubted(0.2, 0.05, true).is_none());
 }
 
 #[test]

@@ -4,6 +4,7 @@ use super::*;
 use crate::check::Component;
 use crate::document::Compared;
 use crate::geometry_deviation::GeometryDeviation;
+use effects::Covariate;
 use kinematics::Pose;
 
 const SLIP: Cause = Cause::Effect("slip_speed");
@@ -166,6 +167,7 @@ fn doubts_are_said_in_their_order() {
         (Doubt::PartOfUnlisted, "may be part of an effect that is not in the catalogue"),
         (Doubt::TermDoesAsWell, "a term that is not in the catalogue explains it as well"),
         (Doubt::Incomplete, "does not explain all that is there"),
+        (Doubt::OtherForm(Covariate::RunTime), "its size changes with time in run, which it should not"),
         (Doubt::ScattersAlike, "other effects that differ from turn to turn scatter alike"),
         (Doubt::OtherGeometry, "beside a geometry that is not the described robot's"),
         (Doubt::DoesNotCarryOver, "it does not carry over: "),

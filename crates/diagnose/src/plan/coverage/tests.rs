@@ -37,7 +37,7 @@ fn some_variants_are_the_first_the_middle_and_the_last() {
         .iter()
         .map(|of| match of {
             Candidate::Effect { id, variant, .. } => (*id, *variant),
-            Candidate::Sparse(_) => panic!("an effect"),
+            Candidate::Sparse(_) | Candidate::Deviation { .. } => panic!("an effect"),
         })
         .collect();
     assert_eq!(some, [("a", 0), ("a", 3), ("a", 6), ("b", 0), ("b", 1), ("c", 0)]);
