@@ -60,9 +60,9 @@ pub enum DiagnoseError {
         /// The id.
         id: String,
     },
-    /// The base model does not follow the robot, and no gross fault explains it.
+    /// The model does not follow the robot, and neither a gross fault nor an effect explains it.
     #[error(
-        "{percent:.0} % of the pose measurements are rejected as outliers, and no gross fault explains it; record poses along the path, not only at its ends"
+        "{percent:.0} % of the pose measurements are rejected as outliers, and no gross fault and no effect explains it; record poses along the path, not only at its ends"
     )]
     OdometryUncorrelated {
         /// Share of measurements left out.
@@ -188,14 +188,7 @@ fn stages(
     let first = fault(datasets, as_recorded.as_ref().ok(), &options.without, outlying);
     let second;
     let (records, base, faults): (&[Dataset], ModelFit<'_>, Vec<&Fault>) = match &first {
-        None => {
-            let base = as_recorded?;
-            let share = rejected_share(&base);
-            if share > MAX_REJECTED_FRACTION {
-                return Err(DiagnoseError::OdometryUncorrelated { percent: 100.0 * share });
-            }
-            (datasets, base, Vec::new())
-        }
+        None => (datasets, as_recorded?, Vec::new()),
         Some(first) => {
             let base = EVERY_MEASUREMENT.fit(&sessions(&first.records))?;
             let without = [&options.without[..], &[first.id.to_owned()]].concat();
@@ -234,6 +227,11 @@ fn stages(
     // Where the counts do not follow the robot at all, no small effect has a meaning: only one with which
     // they follow it, such as a clock that is off.
     let found = &structure.found.model;
+    // A large effect makes outliers of what the calibrated model alone cannot follow.
+    let share = rejected_share(&found.fit);
+    if faults.is_empty() && share > MAX_REJECTED_FRACTION {
+        return Err(DiagnoseError::OdometryUncorrelated { percent: 100.0 * share });
+    }
     let is_uncorrelated = !is_correlated(&found.fit, &found.candidates);
     if is_uncorrelated {
         catalogue.clear();

@@ -250,11 +250,7 @@ pub(crate) fn lack_of_fit(base: &ModelFit<'_>, model: &AugmentedModel<'_>) -> Op
 
 /// The terms of a library by their scores beside a model, the best first, and its p-value; `None` where none is
 /// detectable. Coarse encoders are asked where it is significant at a level without them.
-pub(crate) fn best_first(
-    model: &AugmentedModel<'_>,
-    library: &[Candidate],
-    level: f64,
-) -> Option<(Vec<Scored>, f64)> {
+pub(crate) fn best_first(model: &AugmentedModel<'_>, library: &[Candidate], level: f64) -> Option<(Vec<Scored>, f64)> {
     let mut scored: Vec<Scored> =
         scan(&model.fit, &model.candidates, library).into_iter().filter(|scored| scored.dimensions > 0).collect();
     scored.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
