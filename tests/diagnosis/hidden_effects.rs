@@ -6,6 +6,7 @@
 //! calibration out, and when wheel phases start anew in every run.
 #![allow(clippy::print_stdout)] // every case with its seed
 
+use blind_benchmark::{Scope, challenge_case};
 use dataset::Dataset;
 use diagnose::{Document, Options, UnlistedTerm, Verdict, diagnose};
 use effects::Effect;
@@ -165,6 +166,19 @@ fn a_clock_that_runs_fast_is_no_delay_alone_where_it_has_no_name() {
     println!("clock_rate taken out: {:?}", shown(&document));
     let delay = document.findings.iter().find(|finding| finding.names[0] == "truth_latency").expect("a delay");
     assert!(delay.names.iter().any(|name| name == "unlisted"), "{:?}", shown(&document));
+}
+
+/// Castors that turn a robot by five degrees wherever it reverses: it was pushed there, five times in one log and once
+/// in another, and nothing was compared across that.
+#[test]
+fn regress_a_large_kick_of_a_castor_is_no_robot_that_was_pushed() {
+    let first = |number| {
+        let case = challenge_case(Scope::Large, 6304, number);
+        let case = case.expect("it can be simulated").expect("its effect shows");
+        assert_eq!(case.hidden[0].id, "castor_kick");
+        case.findings().map(|reported| reported.names.join("|")).next()
+    };
+    assert_eq!([3, 132].map(first), [Some("castor_kick".to_owned()), Some("castor_kick".to_owned())]);
 }
 
 /// To the calibrated model a quarter of the poses are outliers, which was refused before anything was sought.

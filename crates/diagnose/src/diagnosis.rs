@@ -31,7 +31,7 @@ use crate::settings::records::{
 use crate::stage::{OnStage, Step};
 use crate::stamp_errors::{stamp_error, stamp_error_by_counts, uncertain_tick_s, whole_stamp_error, with_rows_of};
 use crate::text;
-use crate::unknown_motion::unknown_motions;
+use crate::unknown_motion::{AnomalyKind, unknown_motions};
 
 /// What to leave out of the catalogue, and the limits of the next experiment.
 #[derive(Debug, Clone)]
@@ -148,21 +148,58 @@ fn diagnose_rows(
     if let Some(id) = options.without.iter().find(|id| !CATALOGUE.contains(&id.as_str())) {
         return Err(DiagnoseError::UnknownEffect { id: id.clone() });
     }
-    match stages((datasets, large), options, MIN_COMMON_CLOCK_OFFSET_S) {
+    let stages = |before_fit: BeforeFit| stages((datasets, large), options, before_fit);
+    let mut before_fit = BeforeFit { min_common_clock_s: MIN_COMMON_CLOCK_OFFSET_S, events: true };
+    let first = match stages(before_fit) {
         // To an instrument that is precise, a clock that is off by less makes most measurements outliers.
         Err(DiagnoseError::OdometryUncorrelated { .. }) => {
-            stages((datasets, large), options, MIN_REJECTING_CLOCK_OFFSET_S)
+            before_fit.min_common_clock_s = MIN_REJECTING_CLOCK_OFFSET_S;
+            stages(before_fit)?
         }
-        result => result,
+        result => result?,
+    };
+    if first.has_events
+        && let Ok(whole) = stages(BeforeFit { events: false, ..before_fit })
+        && whole.explains_events_of(&first)
+    {
+        return Ok(whole.diagnosis);
+    }
+    Ok(first.diagnosis)
+}
+
+/// What is taken off the records before the fit.
+#[derive(Clone, Copy)]
+struct BeforeFit {
+    /// An offset of all clocks from so many seconds on.
+    min_common_clock_s: f64,
+    /// Intervals in which robot or frame moved as no wheel says.
+    events: bool,
+}
+
+/// What the stages come to.
+struct Staged {
+    diagnosis: Diagnosis,
+    /// Nothing is compared across some intervals in which the robot may have moved.
+    has_events: bool,
+    /// Something was added to the calibrated model's mean.
+    has_terms: bool,
+    /// Share of the measurements that are outliers beside all that was found.
+    outlier_share: f64,
+}
+
+impl Staged {
+    /// Whether what was found with all intervals compared explains what happened in those of another: as a castor
+    /// turns a robot wherever it reverses. Where it does not, what follows an event are outliers.
+    fn explains_events_of(&self, cut: &Self) -> bool {
+        self.has_terms && self.outlier_share <= cut.outlier_share
     }
 }
 
-/// The stages, where an offset of all clocks from `min_common_clock_s` on is taken off before the fit.
 fn stages(
     (datasets, large): (&[Dataset], Option<&LargeLog>),
     options: &Options,
-    min_common_clock_s: f64,
-) -> Result<Diagnosis, DiagnoseError> {
+    before_fit: BeforeFit,
+) -> Result<Staged, DiagnoseError> {
     let begins = |step| options.on_stage.begins(step);
     begins(Step::Motions);
     // The sampling periods of all runs, on all cores: whoever asks for them later asks run by run.
@@ -174,9 +211,9 @@ fn stages(
     let by_counts = stamp_error_by_counts(datasets, &every_term);
     let recorded = datasets;
     let datasets = by_counts.as_ref().map_or(datasets, |error| &error.records[..]);
-    let clocks = clock_offsets(datasets, min_common_clock_s);
+    let clocks = clock_offsets(datasets, before_fit.min_common_clock_s);
     let datasets = clocks.records.as_deref().unwrap_or(datasets);
-    let odd = unknown_motions(datasets, clocks.remaining_s, uncertain_tick_s(recorded));
+    let odd = unknown_motions(datasets, clocks.remaining_s, uncertain_tick_s(recorded), before_fit.events);
     let (datasets, anomalies) =
         odd.as_ref().map_or((datasets, &[][..]), |found| (&found.records[..], &found.anomalies[..]));
     begins(Step::RecordFaults);
@@ -317,7 +354,22 @@ fn stages(
         extended_model_why_null: extended.as_ref().err().cloned(),
     };
     let (found, carried) = (FittedModel::of(model), FittedModel::of(&carried));
-    Ok(Diagnosis { document, extended, residuals, alternatives, base, calibrated, found, carried, geometry_alone })
+    Ok(Staged {
+        has_events: anomalies.iter().any(|anomaly| anomaly.kind == AnomalyKind::RobotOrFrame),
+        has_terms: !model.candidates.is_empty(),
+        outlier_share: rejected_share(&model.fit),
+        diagnosis: Diagnosis {
+            document,
+            extended,
+            residuals,
+            alternatives,
+            base,
+            calibrated,
+            found,
+            carried,
+            geometry_alone,
+        },
+    })
 }
 
 /// What sessions are called.

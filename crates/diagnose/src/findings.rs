@@ -6,7 +6,7 @@ use effects::GeometryRatio;
 
 use crate::anomaly_findings::of_anomalies;
 use crate::carry_over::CarryOver;
-use crate::cause::Doubt;
+use crate::cause::{Basis, Doubt};
 use crate::check::TestResult;
 use crate::clock_offsets::ClockOffset;
 use crate::finding;
@@ -71,7 +71,7 @@ type Stage = fn(&StageResults<'_, '_>, Vec<Finding>) -> Vec<Finding>;
 
 /// The findings, record faults first, then by significance.
 pub(crate) fn findings(results: &StageResults<'_, '_>) -> Vec<Finding> {
-    let stages: [Stage; 19] = [
+    let stages: [Stage; 20] = [
         record_faults,
         mean_effects,
         clocks,
@@ -86,6 +86,7 @@ pub(crate) fn findings(results: &StageResults<'_, '_>) -> Vec<Finding> {
         doubt_parts_of_stronger_findings,
         doubt_other_forms,
         doubt_incomplete_models,
+        without_what_doubts_say,
         doubt_low_significance,
         doubt_what_does_not_carry_over,
         without_errors_of_the_map,
@@ -241,6 +242,16 @@ fn doubt_incomplete_models(results: &StageResults<'_, '_>, mut findings: Vec<Fin
     {
         finding::or_incomplete(&mut findings, left);
     }
+    findings
+}
+
+/// Failed checks say what is said already of an effect that is plainer than they are, and does not explain all that is
+/// there.
+fn without_what_doubts_say(_: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    let is_incomplete = |doubt: &Doubt| matches!(doubt, Doubt::Incomplete | Doubt::OtherForm(_));
+    let incomplete = findings.iter().filter(|finding| finding.doubts.iter().any(is_incomplete));
+    let plainest = incomplete.map(|finding| finding.z).fold(0.0, f64::max);
+    findings.retain(|finding| !matches!(finding.basis, Basis::FailedTests(_)) || finding.z >= plainest);
     findings
 }
 

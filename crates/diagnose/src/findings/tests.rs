@@ -2,8 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use effects::Covariate;
+
 use super::*;
-use crate::cause::{Basis, Cause};
+use crate::cause::Cause;
 use crate::check::Check;
 use crate::finding::of_causes;
 use crate::fit_cache::FitCache;
@@ -125,6 +127,23 @@ fn failed_checks_are_reported_where_nothing_explains_them() {
     // So do counts that are restored roughly, and not every fault.
     assert!(
         !reported(1e-9, vec![], &[&fault("dropped_samples")]) && reported(1e-9, vec![], &[&fault("swapped_wheels")])
+    );
+}
+
+#[test]
+fn what_is_left_beside_a_plainer_effect_is_said_once() {
+    let datasets = [session(0, 0.0)];
+    let structure = structure(&datasets, &[]);
+    let left = |doubts: Vec<Doubt>, z: f64| {
+        let checks = of_causes(vec![], 1e-9, BTreeMap::new(), Basis::FailedTests(vec![Check::RunToRun]));
+        let tails = of_causes(vec![], 1e-9, BTreeMap::new(), Basis::Autocorrelated(0.3));
+        let all = vec![Finding { doubts, ..mean("slip_speed", 9.0) }, Finding { z, ..checks }, tails];
+        without_what_doubts_say(&results(&datasets, &structure), all).len()
+    };
+    assert_eq!((left(vec![Doubt::Incomplete], 8.9), left(vec![Doubt::OtherForm(Covariate::RunTime)], 8.9)), (2, 2));
+    assert_eq!(
+        (left(vec![Doubt::Incomplete], 9.1), left(vec![Doubt::LowSignificance], 8.9), left(vec![], 1.0)),
+        (3, 3, 3)
     );
 }
 
