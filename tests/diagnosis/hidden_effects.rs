@@ -168,17 +168,28 @@ fn a_clock_that_runs_fast_is_no_delay_alone_where_it_has_no_name() {
     assert!(delay.names.iter().any(|name| name == "unlisted"), "{:?}", shown(&document));
 }
 
+/// The first cause of a case's first finding; its effect is the one hidden.
+fn first_cause(scope: Scope, seed: u64, number: u64, hidden: &str) -> Option<String> {
+    let case = challenge_case(scope, seed, number).expect("it can be simulated").expect("its effect shows");
+    assert_eq!(case.hidden[0].id, hidden);
+    case.findings().next().map(|reported| reported.names[0].clone())
+}
+
 /// Castors that turn a robot by five degrees wherever it reverses: it was pushed there, five times in one log and once
 /// in another, and nothing was compared across that.
 #[test]
 fn regress_a_large_kick_of_a_castor_is_no_robot_that_was_pushed() {
-    let first = |number| {
-        let case = challenge_case(Scope::Large, 6304, number);
-        let case = case.expect("it can be simulated").expect("its effect shows");
-        assert_eq!(case.hidden[0].id, "castor_kick");
-        case.findings().map(|reported| reported.names.join("|")).next()
-    };
-    assert_eq!([3, 132].map(first), [Some("castor_kick".to_owned()), Some("castor_kick".to_owned())]);
+    for number in [3, 132] {
+        let first = first_cause(Scope::Large, 6304, number, "castor_kick");
+        assert_eq!(first.as_deref(), Some("castor_kick"), "case {number}");
+    }
+}
+
+/// A castor's drag of sizes that cannot be explains more: lost counts were taken in spite of it, and dropped again as
+/// they explained too little beside it, so that nothing was found.
+#[test]
+fn regress_what_is_found_in_spite_of_what_cannot_be_stays() {
+    assert_eq!(first_cause(Scope::Whole, 44_044, 29, "missed_counts").as_deref(), Some("missed_counts"));
 }
 
 /// To the calibrated model a quarter of the poses are outliers, which was refused before anything was sought.

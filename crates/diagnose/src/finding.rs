@@ -150,10 +150,13 @@ pub(crate) fn uncatalogued_log_odds() -> f64 {
 
 fn of_candidate(candidate: &Candidate, names: &[Name], test: &Test, trials: usize) -> Finding {
     let top = names.first().map_or(0.0, |name| name.log_odds);
-    let total_odds: f64 = names.iter().map(|name| relative_odds(name.log_odds, top)).sum();
+    // What explains more than any cause that can be is as likely as the first.
+    let is_outdone = names.iter().any(|name| name.outdone);
+    let of_unlisted = if is_outdone { 1.0 } else { 0.0 };
+    let total_odds: f64 = names.iter().map(|name| relative_odds(name.log_odds, top)).sum::<f64>() + of_unlisted;
     let p_value = sidak(test.p_value, trials);
     let mut causes: Vec<Cause> = names.iter().map(|name| name.candidate.cause()).collect();
-    if names.iter().any(|name| name.outdone) {
+    if is_outdone {
         causes.push(Cause::Unknown);
     }
     Finding {

@@ -42,6 +42,11 @@ pub enum Refusal {
 }
 
 impl Refusal {
+    /// Whether no robot is as its fit says.
+    pub(crate) const fn is_impossible(self) -> bool {
+        matches!(self, Self::Unphysical | Self::Implausible | Self::OtherWheels)
+    }
+
     /// Whether it explains what all runs show together, and is refused for what it does to single ones.
     pub(crate) const fn is_for_other_runs(self) -> bool {
         matches!(self, Self::NotOverRuns | Self::PredictsWorse | Self::DriftsMore)

@@ -77,6 +77,32 @@ fn grown<'a>(
     None
 }
 
+/// The rivals of an effect of the model by how much the best of a scan explains. Where none of those that explain as
+/// much can be, by how much the best of the others does: what was taken in spite of the first stays for that reason.
+/// Its cause is outdone then.
+fn possible_rivals<'a>(
+    (base, known): (&ModelFit<'a>, &mut FitCache<'a>),
+    without: &AugmentedModel<'a>,
+    index: usize,
+    entries: &[Entry],
+    refusals: &mut Refusals,
+) -> Vec<(Name, AugmentedModel<'a>)> {
+    let mut open = entries.to_vec();
+    loop {
+        let best = open.iter().map(|entry| entry.scored.statistic).fold(0.0, f64::max);
+        let mut found = rivals((base, &mut *known), without, index, &open, best, refusals);
+        let left = open.len();
+        if !found.is_empty() {
+            found[0].0.outdone |= left < entries.len();
+            return found;
+        }
+        open.retain(|entry| !refusals.get(entry.scored.candidate.id()).is_some_and(|refusal| refusal.is_impossible()));
+        if open.len() == left {
+            return found;
+        }
+    }
+}
+
 /// The model without the effects that only cancel each other: two that were found in the place of a third
 /// stay significant beside it, each given the other, and two that no third stands for fit the driving that
 /// was recorded by the difference of two large errors, and fail on any other. Of all subsets of the effects
@@ -197,8 +223,7 @@ pub(crate) fn search<'a>(
     while index < model.candidates.len() {
         let Some(without) = known.without(base, &model, index) else { break };
         let entries = best_variants(known.beside(&without, catalogue));
-        let best = entries.iter().map(|entry| entry.scored.statistic).fold(0.0, f64::max);
-        let mut found = rivals((base, &mut known), &without, index, &entries, best, &mut refusals);
+        let mut found = possible_rivals((base, &mut known), &without, index, &entries, &mut refusals);
         if found.first().is_none_or(|(name, _)| name.log_odds <= 0.0) {
             // Another candidate explains it, or beside the others no physical one does.
             model = without;

@@ -98,7 +98,8 @@ fn a_cause_is_as_probable_as_its_odds_and_no_catalogue_is_complete() {
     // Where an impossible one does better, it may be none of them.
     let outdone = of_candidate(&effect("slip_speed"), &[name("slip_speed", 20.0, true)], &test(1e-6, 25.0), 1);
     assert_eq!(outdone.causes, [SLIP, Cause::Unknown]);
-    assert!(is_near(outdone.probability, 0.95) && is_near(outdone.p_value, 1e-6));
+    // What cannot be explains more: something else is as likely.
+    assert!(is_near(outdone.probability, 0.475) && is_near(outdone.p_value, 1e-6));
     // What a double does not hold is told by the statistic.
     let beyond = of_candidate(&effect("slip_speed"), &[], &test(0.0, 2500.0), 1);
     assert_eq!((beyond.z, beyond.probability), (50.0, 0.95));
