@@ -11,8 +11,8 @@ use crate::check::TestResult;
 use crate::clock_offsets::ClockOffset;
 use crate::finding;
 use crate::finding::Finding;
-use crate::form_deviation::form_deviation;
 use crate::geometry_deviations::remaining_deviations;
+use crate::lack_of_fit::lack_of_fit;
 use crate::map_errors::without_map_errors;
 use crate::mean_lateness::join_clock;
 use crate::mean_structure::MeanStructure;
@@ -21,7 +21,7 @@ use crate::noise_effects::scatter;
 use crate::record_faults::{Fault, wrong_wheels};
 use crate::settings::findings::DEPENDENCE_BEYOND_NOISE_LEVEL;
 use crate::settings::levels::MAX_EFFECTS;
-use crate::sparse_terms::{UncataloguedTerms, lack_of_fit};
+use crate::sparse_terms::UncataloguedTerms;
 use crate::stamp_errors::{StampError, have_uncertain_rows};
 use crate::unknown_motion::Anomaly;
 use crate::wald::wald_test;
@@ -71,7 +71,7 @@ type Stage = fn(&StageResults<'_, '_>, Vec<Finding>) -> Vec<Finding>;
 
 /// The findings, record faults first, then by significance.
 pub(crate) fn findings(results: &StageResults<'_, '_>) -> Vec<Finding> {
-    let stages: [Stage; 20] = [
+    let stages: [Stage; 19] = [
         record_faults,
         mean_effects,
         clocks,
@@ -84,7 +84,6 @@ pub(crate) fn findings(results: &StageResults<'_, '_>) -> Vec<Finding> {
         failed_checks,
         without_errors_of_form,
         doubt_parts_of_stronger_findings,
-        doubt_other_forms,
         doubt_incomplete_models,
         without_what_doubts_say,
         doubt_low_significance,
@@ -223,24 +222,24 @@ fn doubt_parts_of_stronger_findings(results: &StageResults<'_, '_>, mut findings
     findings
 }
 
-/// Effects whose data have another form than they have.
-fn doubt_other_forms(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+/// Effects whose data have another form than they have, and an uncatalogued term that is significant beside all that
+/// was found, though not by enough to be a finding.
+fn doubt_incomplete_models(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    if !findings.iter().any(Finding::is_certain) {
+        return findings;
+    }
     let model = results.structure.model();
-    for finding in findings.iter_mut().filter(|finding| finding.is_certain()) {
-        let term = finding.term.and_then(|index| Some((form_deviation(model, index)?, &model.candidates[index])));
-        if let Some((deviation, candidate)) = term {
-            finding::or_of_other_form(finding, deviation, candidate.has_exact_form());
+    let effects: Vec<usize> =
+        findings.iter().filter(|finding| finding.is_certain()).filter_map(|finding| finding.term).collect();
+    let left = lack_of_fit(&results.structure.base, model, &effects);
+    for (index, deviation) in left.of_forms {
+        let has_exact_form = model.candidates[index].has_exact_form();
+        if let Some(finding) = findings.iter_mut().find(|finding| finding.term == Some(index)) {
+            finding::or_of_other_form(finding, deviation, has_exact_form);
         }
     }
-    findings
-}
-
-/// An uncatalogued term that is significant beside all that was found, though not by enough to be a finding.
-fn doubt_incomplete_models(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
-    if findings.iter().any(Finding::is_certain)
-        && let Some(left) = lack_of_fit(&results.structure.base, results.structure.model())
-    {
-        finding::or_incomplete(&mut findings, left);
+    if let Some(product) = left.of_products {
+        finding::or_incomplete(&mut findings, product);
     }
     findings
 }

@@ -14,7 +14,6 @@ use crate::model_comparison::{form_error_statistic, log_bayes_factor, regated};
 use crate::null_distribution::NullDistribution;
 use crate::reliability::unresolved;
 use crate::scan::{Scored, scan};
-use crate::settings::findings::LACK_OF_FIT_LEVEL;
 use crate::settings::levels::SPARSE_TERM_LEVEL;
 use crate::settings::search::{MAX_SPARSE_REFITS, MAX_SPARSE_TERMS};
 use crate::statistics::{p_of_chi_square, sidak};
@@ -85,7 +84,7 @@ impl<'a> UncataloguedTerms<'a> {
 }
 
 /// Products of at most three covariates that vanish at standstill.
-fn library(fit: &ModelFit<'_>) -> Vec<Candidate> {
+pub(crate) fn library(fit: &ModelFit<'_>) -> Vec<Candidate> {
     use Covariate::{
         AbsSpeed, AbsYawRate, Acceleration, CosHeading, CosPhase, Curvature, LastTurn, RunTime, SessionTime,
         SinHeading, SinPhase, SinceReversal, Speed, Way, X, Y, YawAcceleration, YawRate,
@@ -187,7 +186,8 @@ impl<'m, 'a> SparseSearch<'m, 'a> {
     /// score at a level.
     pub(crate) fn beside(level: f64, base: &ModelFit<'a>, model: &'m AugmentedModel<'a>) -> Option<Self> {
         // No finding is asked for at a higher level.
-        let (scored, p_value) = best_first(model, &library(base), SPARSE_TERM_LEVEL)?;
+        let scored = scan(&model.fit, &model.candidates, &library(base));
+        let (scored, p_value) = best_first(model, scored, (level, SPARSE_TERM_LEVEL))?;
         let trials = scored.len();
         if p_value > level {
             return None;
@@ -242,24 +242,25 @@ impl<'m, 'a> SparseSearch<'m, 'a> {
     }
 }
 
-/// Score of the best sparse term beside a model, and its p-value; `None` where no term is detectable.
-pub(crate) fn lack_of_fit(base: &ModelFit<'_>, model: &AugmentedModel<'_>) -> Option<(f64, f64)> {
-    let (scored, p_value) = best_first(model, &library(base), LACK_OF_FIT_LEVEL)?;
-    Some((scored.first()?.statistic, p_value))
-}
-
-/// The terms of a library by their scores beside a model, the best first, and its p-value; `None` where none is
-/// detectable. Coarse encoders are asked where it is significant at a level without them.
-pub(crate) fn best_first(model: &AugmentedModel<'_>, library: &[Candidate], level: f64) -> Option<(Vec<Scored>, f64)> {
-    let mut scored: Vec<Scored> =
-        scan(&model.fit, &model.candidates, library).into_iter().filter(|scored| scored.dimensions > 0).collect();
+/// Terms by their scores beside a model, the best first, and its p-value, of those that the encoders resolve; `None`
+/// where none is detectable. Which they are is found out if the best may be significant at the level that is asked
+/// for, and coarse encoders are asked where it is significant at the second level without them.
+pub(crate) fn best_first(
+    model: &AugmentedModel<'_>,
+    mut scored: Vec<Scored>,
+    (asked, deflated): (f64, f64),
+) -> Option<(Vec<Scored>, f64)> {
+    scored.retain(|scored| scored.dimensions > 0);
     scored.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
     let best = (2 * MAX_SPARSE_REFITS).min(scored.len());
-    let unresolved = unresolved(&model.fit, &model.candidates, &scored[..best]);
-    scored.retain(|scored| !unresolved.contains(&scored.candidate));
+    // Of fewer trials the best is more significant.
+    if sidak(scored.first()?.p_value, (scored.len() - best).max(1)) <= asked {
+        let unresolved = unresolved(&model.fit, &model.candidates, &scored[..best]);
+        scored.retain(|scored| !unresolved.contains(&scored.candidate));
+    }
     let trials = scored.len();
     let p_value = |scored: &[Scored]| Some(sidak(scored.first()?.p_value, trials));
-    if p_value(&scored)? <= level
+    if p_value(&scored)? <= deflated
         && let Some(null) = NullDistribution::of(model)
     {
         deflate_best(&null, &mut scored);

@@ -11,9 +11,9 @@ use crate::candidate::{Candidate, mean_terms};
 use crate::detectability::detectability;
 use crate::extended_scenario::SamplingStatistics;
 use crate::fit_cache::FitCache;
-use crate::form_deviation::form_deviation;
 use crate::gain::gain_by_level;
 use crate::geometry_deviations::{keeps_wheels, remaining_deviations};
+use crate::lack_of_fit::lack_of_fit;
 use crate::model_comparison::{form_error_statistic, log_bayes_factor, margin_over_units};
 use crate::null_distribution::NullDistribution;
 use crate::part_of_runs::part_of_runs;
@@ -27,7 +27,7 @@ use crate::scan::scan;
 use crate::selection::{search, search_ungated};
 use crate::settings::levels::SCAN_LEVEL;
 use crate::small_robot::{assert_unmoved, effect, fitted, session, with_effects};
-use crate::sparse_terms::{SparseSearch, lack_of_fit};
+use crate::sparse_terms::SparseSearch;
 use crate::turn_to_turn::differs_from_turn_to_turn;
 use crate::wald::{cluster_robust_test, p_value_over, tests_of};
 
@@ -84,8 +84,7 @@ fn asked(datasets: &[Dataset]) -> String {
     line("next", &[0, 1, 2].map(|component| residual_persistence(&alone, component)));
     let checked = check(&model);
     line("checks", &(checked.checks, checked.correlation, checked.outliers, checked.autocorrelated));
-    line("lack of fit", &lack_of_fit(&base, &of_latency));
-    line("form", &form_deviation(&of_latency, 0));
+    line("lack of fit", &lack_of_fit(&base, &of_latency, &[0]));
     // Profiles of residuals are long, and those of one robot go through what makes all.
     if datasets.len() == 1 && datasets[0].robot.ticks_per_rev.is_none() {
         line("residuals", &residuals(&base, &model));
