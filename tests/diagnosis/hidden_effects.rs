@@ -153,13 +153,14 @@ fn a_wheel_out_of_round_is_two_terms_of_that_wheel_where_it_has_no_name() {
 fn of_fast_clock(every: usize) -> Dataset {
     let mut dataset = simulated(&case("clock_rate", "rate = 0.004"), 9_200);
     for run in &mut dataset.runs {
-        run.truth = run.truth.iter().step_by(every).cloned().collect();
+        run.truth = run.truth.iter().step_by(every).copied().collect();
     }
     dataset
 }
 
-/// A delay takes up what a clock does in the middle of a run: too much before and too little after. Left out of the
-/// catalogue, the clock is no delay alone, also where measurements are too few for a term among hundreds.
+/// A delay takes up what a clock does in the middle of a run: too much before and too little after. Left out
+/// of the catalogue, the clock is no delay alone, also where measurements are too few for a term among
+/// hundreds.
 #[test]
 fn a_clock_that_runs_fast_is_no_delay_alone_where_it_has_no_name() {
     let document = diagnosed(&of_fast_clock(40), &["clock_rate"]);
@@ -175,8 +176,8 @@ fn first_cause(scope: Scope, seed: u64, number: u64, hidden: &str) -> Option<Str
     case.findings().next().map(|reported| reported.names[0].clone())
 }
 
-/// Castors that turn a robot by five degrees wherever it reverses: it was pushed there, five times in one log and once
-/// in another, and nothing was compared across that.
+/// Castors that turn a robot by five degrees wherever it reverses: it was pushed there, five times in one log
+/// and once in another, and nothing was compared across that.
 #[test]
 fn regress_a_large_kick_of_a_castor_is_no_robot_that_was_pushed() {
     for number in [3, 132] {
@@ -185,8 +186,8 @@ fn regress_a_large_kick_of_a_castor_is_no_robot_that_was_pushed() {
     }
 }
 
-/// A castor's drag of sizes that cannot be explains more: lost counts were taken in spite of it, and dropped again as
-/// they explained too little beside it, so that nothing was found.
+/// A castor's drag of sizes that cannot be explains more: lost counts were taken in spite of it, and dropped
+/// again as they explained too little beside it, so that nothing was found.
 #[test]
 fn regress_what_is_found_in_spite_of_what_cannot_be_stays() {
     assert_eq!(first_cause(Scope::Whole, 44_044, 29, "missed_counts").as_deref(), Some("missed_counts"));

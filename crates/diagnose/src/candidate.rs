@@ -1,5 +1,5 @@
-//! What can be tested: the catalogue's mean terms, sparse terms, and deviations from the form of either, as the
-//! likelihood takes them.
+//! What can be tested: the catalogue's mean terms, sparse terms, and deviations from the form of either, as
+//! the likelihood takes them.
 
 use effects::{CATALOGUE, Covariate, Description, Hypothesis, OnBoard, Sparse, hypothesis};
 use model_term::{ModelTerm, TermParameter};
@@ -13,8 +13,8 @@ pub(crate) enum Candidate {
     Effect { id: &'static str, variant: usize, at: Option<f64> },
     /// A product of covariates on one channel.
     Sparse(Sparse),
-    /// A deviation from the form of another candidate at its sizes, with a covariate. It is tested, and named by
-    /// nothing.
+    /// A deviation from the form of another candidate at its sizes, with a covariate. It is tested, and named
+    /// by nothing.
     Deviation { of: Box<Self>, sizes: Vec<f64>, by: Covariate },
 }
 

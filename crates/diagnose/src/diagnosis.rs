@@ -188,8 +188,8 @@ struct Staged {
 }
 
 impl Staged {
-    /// Whether what was found with all intervals compared explains what happened in those of another: as a castor
-    /// turns a robot wherever it reverses. Where it does not, what follows an event are outliers.
+    /// Whether what was found with all intervals compared explains what happened in those of another: as a
+    /// castor turns a robot wherever it reverses. Where it does not, what follows an event are outliers.
     fn explains_events_of(&self, cut: &Self) -> bool {
         self.has_terms && self.outlier_share <= cut.outlier_share
     }

@@ -233,8 +233,8 @@ pub(crate) fn beside_unlisted(findings: &mut [Finding], odds: f64) {
     }
 }
 
-/// The odds of an uncatalogued cause over those named, by a p-value beside these. A p-value speaks against its
-/// hypothesis by no more than 1/(−e p ln p) (Sellke, Bayarri & Berger 2001).
+/// The odds of an uncatalogued cause over those named, by a p-value beside these. A p-value speaks against
+/// its hypothesis by no more than 1/(−e p ln p) (Sellke, Bayarri & Berger 2001).
 fn uncatalogued_odds(p_value: f64) -> f64 {
     let bayes_factor_bound = (-std::f64::consts::E * p_value * p_value.max(f64::MIN_POSITIVE).ln()).recip();
     (bayes_factor_bound * UNCATALOGUED_PRIOR / (1.0 - UNCATALOGUED_PRIOR)).min(1.0)

@@ -222,8 +222,8 @@ fn doubt_parts_of_stronger_findings(results: &StageResults<'_, '_>, mut findings
     findings
 }
 
-/// Effects whose data have another form than they have, and an uncatalogued term that is significant beside all that
-/// was found, though not by enough to be a finding.
+/// Effects whose data have another form than they have, and an uncatalogued term that is significant beside
+/// all that was found, though not by enough to be a finding.
 fn doubt_incomplete_models(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
     if !findings.iter().any(Finding::is_certain) {
         return findings;
@@ -244,8 +244,8 @@ fn doubt_incomplete_models(results: &StageResults<'_, '_>, mut findings: Vec<Fin
     findings
 }
 
-/// Failed checks say what is said already of an effect that is plainer than they are, and does not explain all that is
-/// there.
+/// Failed checks say what is said already of an effect that is plainer than they are, and does not explain
+/// all that is there.
 fn without_what_doubts_say(_: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
     let is_incomplete = |doubt: &Doubt| matches!(doubt, Doubt::Incomplete | Doubt::OtherForm(_));
     let incomplete = findings.iter().filter(|finding| finding.doubts.iter().any(is_incomplete));

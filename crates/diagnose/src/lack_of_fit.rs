@@ -1,9 +1,9 @@
-//! What is left beside the effects that were found: scores of a library of products, and of each effect's own term
-//! times a covariate.
+//! What is left beside the effects that were found: scores of a library of products, and of each effect's own
+//! term times a covariate.
 //!
-//! What is named for another cause explains part of it, and what is left goes with the same motion: a delay for a
-//! clock that runs fast grows with time. One direction for each covariate tells that where a library of hundreds of
-//! products, each by itself, does not.
+//! What is named for another cause explains part of it, and what is left goes with the same motion: a delay
+//! for a clock that runs fast grows with time. One direction for each covariate tells that where a library of
+//! hundreds of products, each by itself, does not.
 
 use effects::Covariate;
 use estimation::ModelFit;
@@ -23,8 +23,8 @@ const COVARIATES: [Covariate; 3] = [Covariate::AbsSpeed, Covariate::AbsYawRate, 
 pub(crate) struct LackOfFit {
     /// Score of the best product of the library, and its p-value; `None` where none is detectable.
     pub(crate) of_products: Option<(f64, f64)>,
-    /// The deviations of the forms asked for, by the indices of their effects in the model; without those that
-    /// are not detectable.
+    /// The deviations of the forms asked for, by the indices of their effects in the model; without those
+    /// that are not detectable.
     pub(crate) of_forms: Vec<(usize, FormDeviation)>,
 }
 

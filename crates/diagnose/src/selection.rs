@@ -77,9 +77,9 @@ fn grown<'a>(
     None
 }
 
-/// The rivals of an effect of the model by how much the best of a scan explains. Where none of those that explain as
-/// much can be, by how much the best of the others does: what was taken in spite of the first stays for that reason.
-/// Its cause is outdone then.
+/// The rivals of an effect of the model by how much the best of a scan explains. Where none of those that
+/// explain as much can be, by how much the best of the others does: what was taken in spite of the first
+/// stays for that reason. Its cause is outdone then.
 fn possible_rivals<'a>(
     (base, known): (&ModelFit<'a>, &mut FitCache<'a>),
     without: &AugmentedModel<'a>,

@@ -242,9 +242,9 @@ impl<'m, 'a> SparseSearch<'m, 'a> {
     }
 }
 
-/// Terms by their scores beside a model, the best first, and its p-value, of those that the encoders resolve; `None`
-/// where none is detectable. Which they are is found out if the best may be significant at the level that is asked
-/// for, and coarse encoders are asked where it is significant at the second level without them.
+/// Terms by their scores beside a model, the best first, and its p-value, of those that the encoders resolve;
+/// `None` where none is detectable. Which they are is found out if the best may be significant at the level
+/// that is asked for, and coarse encoders are asked where it is significant at the second level without them.
 pub(crate) fn best_first(
     model: &AugmentedModel<'_>,
     mut scored: Vec<Scored>,

@@ -41,8 +41,8 @@ pub(crate) struct UnknownMotions {
 }
 
 /// Looks for them; `None` where there are none. The instrument is late by so much in all runs. In some run a
-/// row may be stamped a tick of so long off, seconds: what the robot moves meanwhile is no event. Runs alone are
-/// looked for without `with_events`.
+/// row may be stamped a tick of so long off, seconds: what the robot moves meanwhile is no event. Runs alone
+/// are looked for without `with_events`.
 pub(crate) fn unknown_motions(
     datasets: &[Dataset],
     late_s: f64,

@@ -62,9 +62,9 @@ impl Sparse {
     }
 }
 
-/// By how much a term's form is off with a covariate: the term at given sizes times the covariate. The parameter is
-/// the deviation relative to the term, for each unit of the covariate; `sizes` are as many as the term has
-/// parameters.
+/// By how much a term's form is off with a covariate: the term at given sizes times the covariate. The
+/// parameter is the deviation relative to the term, for each unit of the covariate; `sizes` are as many as
+/// the term has parameters.
 #[must_use]
 pub fn modulated(term: Box<dyn ModelTerm>, sizes: Vec<f64>, by: Covariate) -> Box<dyn ModelTerm> {
     Box::new(Modulated::new(term, sizes, by))

@@ -14,8 +14,8 @@ use crate::covariate::Covariate;
 /// seconds of a minute.
 const DEVIATION: [TermParameter; 1] = [TermParameter { name: "deviation", unit: "1", prior_sigma: 30.0 }];
 
-/// A term at given sizes, times a covariate. Its parameter is the deviation of the term's form from its own, relative
-/// to it and for each unit of the covariate.
+/// A term at given sizes, times a covariate. Its parameter is the deviation of the term's form from its own,
+/// relative to it and for each unit of the covariate.
 #[derive(Clone)]
 pub(super) struct Modulated {
     term: Box<dyn ModelTerm>,
