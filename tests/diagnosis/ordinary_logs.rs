@@ -141,6 +141,19 @@ const FAULTS: &[(&str, Change, &str)] = &[
     ("truth 0.4 s late", |of| of.latency_s = 0.4, "truth_latency"),
     ("truth 0.3 s late in one run", |of| of.late_run = Some((6, 0.3)), "truth_latency"),
     ("truth 100 ms late", |of| of.latency_s = 0.1, "truth_latency"),
+    ("a clock that is 500 ppm slow, one long log", |of| (of.clock_gain, of.joined) = (-5e-4, true), "clock_rate"),
+    ("a clock that is 0.1 % fast, one long log", |of| (of.clock_gain, of.joined) = (1e-3, true), "clock_rate"),
+    ("a clock that is 0.4 % slow, one long log", |of| (of.clock_gain, of.joined) = (-4e-3, true), "clock_rate"),
+    (
+        "a clock that is 0.4 % fast, motion capture",
+        |of| (of.clock_gain, of.truth_sigma_m, of.truth_sigma_rad) = (4e-3, 3e-4, 5e-4),
+        "clock_rate",
+    ),
+    (
+        "a clock that is 0.1 % fast since the session began",
+        |of| (of.clock_gain, of.clock_runs_on) = (1e-3, true),
+        "clock_rate",
+    ),
     // Not normal, and no large errors: neither bumps nor outliers.
     ("uniform errors of the instrument", |of| of.has_uniform_errors = true, "unlisted"),
 ];

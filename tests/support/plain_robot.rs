@@ -59,6 +59,10 @@ pub(crate) struct PlainRobot {
     pub(crate) reports: Reports,
     /// The pose that is reported is so old, seconds.
     pub(crate) latency_s: f64,
+    /// What the robot's clock gains from each run's start on, seconds a second.
+    pub(crate) clock_gain: f64,
+    /// It runs on from the session's start instead.
+    pub(crate) clock_runs_on: bool,
     /// One run whose truth is off by so much time, seconds, by index.
     pub(crate) late_run: Option<(usize, f64)>,
     /// Events, by the index of their run.
@@ -92,6 +96,8 @@ impl PlainRobot {
             has_uniform_errors: false,
             reports: Reports::Poses,
             latency_s: 0.0,
+            clock_gain: 0.0,
+            clock_runs_on: false,
             late_run: None,
             events: Vec::new(),
             wheel_sigma_m_per_sqrt_m: 3e-4,
@@ -130,7 +136,8 @@ impl PlainRobot {
                 .expect("text");
             world.at = [draws.normal(), draws.normal(), PI * (2.0 * draws.uniform() - 1.0)];
             let path = world.drive(legs, (self, number), (base_m, radius_m, phase_rad), &mut draws);
-            self.log_rows(id, &path, &mut odometry, &mut draws);
+            let since_s = if self.clock_runs_on { start_s } else { 0.0 };
+            self.log_rows((id, since_s), &path, &mut odometry, &mut draws);
             self.log_truth(number, id, &path, &mut truth, &mut draws);
         }
         let sigma = |sigma: f64| if sigma > 0.0 { sigma } else { 0.0 };
@@ -177,13 +184,14 @@ impl PlainRobot {
         seen
     }
 
-    fn log_rows(&self, id: &str, path: &Path1kHz, odometry: &mut String, draws: &mut Draws) {
+    fn log_rows(&self, (id, since_s): (&str, f64), path: &Path1kHz, odometry: &mut String, draws: &mut Draws) {
         let every = (1000.0 / self.odometry_hz).round() as usize;
         let offset = [draws.uniform(), draws.uniform()];
         let mut last_s = f64::NEG_INFINITY;
         for step in (0..path.samples.len()).step_by(every) {
             let is_lost = draws.uniform() < self.lost_rows;
             let true_s = 1e-3 * step as f64;
+            let true_s = true_s + self.clock_gain * (since_s + true_s);
             let stamp_s = match self.stamps {
                 Stamps::Exact => true_s,
                 Stamps::Jitter(sigma_s) => true_s + sigma_s * draws.normal(),

@@ -55,6 +55,8 @@ pub(crate) enum Basis {
     Geometry(GeometryDeviation),
     /// The clock of the instrument is off by so many seconds: of all runs, or of these.
     ClockOffset(f64),
+    /// The robot's clock gains so many seconds a second on the instrument's.
+    ClockDrift(f64),
     /// Stretches of runs that do not belong, the largest first.
     Anomalies(Vec<Anomaly>),
     /// A fault of the records, in words.

@@ -115,20 +115,32 @@ fn common_offset_s(all: &[OfRun]) -> Option<f64> {
 type Pose4 = (f64, f64, f64, f64);
 
 /// The profile log likelihood of a run's offset, negative, on a grid.
-struct Profile {
+pub(crate) struct Profile {
     costs: Vec<f64>,
-    offset_s: f64,
-    sigma_s: f64,
+    pub(crate) offset_s: f64,
+    pub(crate) sigma_s: f64,
 }
 
 impl Profile {
     /// Of a run that measures poses often enough; `None` of others, of one that hardly moves, and of one
     /// whose log has rows that no wheel makes.
     fn of(run: &RunView<'_>, dataset: &Dataset, geometry: &DriveGeometry) -> Option<Self> {
+        Self::of_part(run, dataset, geometry, ([f64::NEG_INFINITY, f64::INFINITY], 1))
+    }
+
+    /// The same by what is measured in one of so many parts of the run, by as large a share of the pairs.
+    pub(crate) fn of_part(
+        run: &RunView<'_>,
+        dataset: &Dataset,
+        geometry: &DriveGeometry,
+        (span_s, parts): ([f64; 2], usize),
+    ) -> Option<Self> {
         let track = WheelAngleInterpolator::of(run, &dataset.robot)?;
         let (rows_s, truth) = (&run.odometry().t_s, &run.run().truth);
         let [first_s, last_s] = known_between(rows_s, track.turns())?;
-        let within = |t_s: f64| t_s - MAX_CLOCK_OFFSET_S >= first_s && t_s + MAX_CLOCK_OFFSET_S <= last_s;
+        let [from_s, to_s] =
+            [(first_s + MAX_CLOCK_OFFSET_S).max(span_s[0]), (last_s - MAX_CLOCK_OFFSET_S).min(span_s[1])];
+        let within = |t_s: f64| t_s >= from_s && t_s <= to_s;
         let poses: Vec<Pose4> = truth
             .iter()
             .filter(|sample| within(sample.t_s))
@@ -137,7 +149,7 @@ impl Profile {
         if !run.info().continuous || poses.len() <= MIN_CLOCK_PAIRS || has_outlying_rows(run.run()) {
             return None;
         }
-        let stride = poses.len().div_ceil(MAX_CLOCK_PAIRS);
+        let stride = poses.len().div_ceil(MAX_CLOCK_PAIRS / parts);
         let pairs = || poses.windows(2).step_by(stride).map(|pair| (pair[0], pair[1]));
         let steps = (MAX_CLOCK_OFFSET_S / CLOCK_STEP_S).round() as i32;
         // Below a tenth of a milliradian and of a millimetre a pair nothing distinguishes offsets, nor below
@@ -193,12 +205,12 @@ impl Profile {
     }
 
     /// How far off other clocks it is no other clock, seconds.
-    const fn tolerance_s(&self) -> f64 {
+    pub(crate) const fn tolerance_s(&self) -> f64 {
         MIN_CLOCK_OFFSET_S.max(MIN_CLOCK_SIGMAS * self.sigma_s)
     }
 
     /// Log likelihood of its offset over that of another.
-    fn gain_over(&self, offset_s: f64) -> f64 {
+    pub(crate) fn gain_over(&self, offset_s: f64) -> f64 {
         let lowest = self.costs.iter().copied().fold(f64::INFINITY, f64::min);
         let middle = (self.costs.len() / 2) as f64;
         let at = (offset_s / CLOCK_STEP_S + middle).clamp(0.0, 2.0 * middle);

@@ -13,6 +13,7 @@ use crate::augmented_model::{AugmentedModel, refit};
 use crate::candidate::{Candidate, mean_terms};
 use crate::carry_over::{CarryOver, carry_over};
 use crate::check::TestResult;
+use crate::clock_drift::clock_drift;
 use crate::clock_offsets::clock_offsets;
 use crate::detectability::detectability;
 use crate::document::{Document, Gain};
@@ -211,6 +212,8 @@ fn stages(
     let by_counts = stamp_error_by_counts(datasets, &every_term);
     let recorded = datasets;
     let datasets = by_counts.as_ref().map_or(datasets, |error| &error.records[..]);
+    let drift = clock_drift(datasets, before_fit.min_common_clock_s);
+    let (drift, datasets) = drift.as_ref().map_or((None, datasets), |(drift, records)| (Some(drift), &records[..]));
     let clocks = clock_offsets(datasets, before_fit.min_common_clock_s);
     let datasets = clocks.records.as_deref().unwrap_or(datasets);
     let odd = unknown_motions(datasets, clocks.remaining_s, uncertain_tick_s(recorded), before_fit.events);
@@ -292,6 +295,7 @@ fn stages(
         spans: spans.as_ref(),
         faults: &faults,
         clocks: &clocks.offsets,
+        drift,
         stamps,
         anomalies,
         uncorrelated: is_uncorrelated,

@@ -10,6 +10,7 @@ use crate::candidate::Candidate;
 use crate::carry_over::CarryOver;
 use crate::cause::{Basis, Cause, Doubt};
 use crate::check::{Check, TestResult};
+use crate::clock_drift::ClockDrift;
 use crate::clock_offsets::ClockOffset;
 use crate::document::{UnlistedTerm, Value};
 use crate::geometry_deviation::GeometryDeviation;
@@ -355,6 +356,21 @@ pub(crate) fn of_clock(offset: &ClockOffset, without: &[String]) -> Finding {
     Finding { runs: offset.runs.clone(), ..found }
 }
 
+/// The finding of a clock that runs fast or slow.
+pub(crate) fn of_drift(drift: &ClockDrift, without: &[String]) -> Finding {
+    let is_rate = |id: &&'static str| effects::description(id).is_some_and(|description| description.is_clock_rate);
+    let rate = Value { value: drift.rate, sigma: Some(drift.sigma), unit: "1".to_owned() };
+    let since = Value { value: 1.0, sigma: None, unit: "1".to_owned() };
+    let since = drift.of_session.then(|| ("since_session_start".to_owned(), since));
+    let (cause, parameters) = match CATALOGUE.iter().copied().find(is_rate) {
+        Some(id) if !without.iter().any(|out| out == id) => {
+            (Cause::Effect(id), [("rate".to_owned(), rate)].into_iter().chain(since).collect())
+        }
+        _ => (Cause::Unknown, BTreeMap::new()),
+    };
+    of_causes(vec![cause], p_of_chi_square(2.0 * drift.gain, 1.0), parameters, Basis::ClockDrift(drift.rate))
+}
+
 /// The finding of an error of the stamps.
 pub(crate) fn of_stamps(error: &StampError) -> Finding {
     let (p_value, values) = (error.test.p_value, parameters(&error.candidate, &error.test.estimates));
@@ -362,15 +378,17 @@ pub(crate) fn of_stamps(error: &StampError) -> Finding {
     Finding { z: z(&error.test, p_value), ..found }
 }
 
-/// Adds what was taken off the clock before the fit to what was found of it after.
+/// Adds what was taken off the clock before the fit to what was found of it after, which is as significant as
+/// both.
 pub(crate) fn add_offset(findings: &mut [Finding], of_clock: &Finding) -> bool {
     let same = |finding: &&mut Finding| finding.runs.is_none() && finding.first() == of_clock.first();
     let Some(found) = findings.iter_mut().find(same) else { return false };
-    for (name, value) in &of_clock.parameters {
+    for (name, value) in of_clock.parameters.iter().filter(|(_, value)| value.sigma.is_some()) {
         if let Some(own) = found.parameters.get_mut(name) {
             own.value += value.value;
         }
     }
+    (found.z, found.p_value) = (found.z.max(of_clock.z), found.p_value.min(of_clock.p_value));
     true
 }
 

@@ -8,6 +8,7 @@ use crate::anomaly_findings::of_anomalies;
 use crate::carry_over::CarryOver;
 use crate::cause::{Basis, Doubt};
 use crate::check::TestResult;
+use crate::clock_drift::ClockDrift;
 use crate::clock_offsets::ClockOffset;
 use crate::finding;
 use crate::finding::Finding;
@@ -45,6 +46,8 @@ pub(crate) struct StageResults<'e, 'a> {
     pub(crate) spans: Option<&'e TestResult>,
     pub(crate) faults: &'e [&'e Fault],
     pub(crate) clocks: &'e [ClockOffset],
+    /// A drift of all clocks that was set right before the fit.
+    pub(crate) drift: Option<&'e ClockDrift>,
     /// What was wrong with the log's stamps.
     pub(crate) stamps: Option<&'e StampError>,
     /// Runs and intervals that do not belong.
@@ -110,6 +113,14 @@ fn mean_effects(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> V
 
 /// Clocks that were set right before the fit, or whose runs were left out.
 fn clocks(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    if let Some(drift) = results.drift {
+        let found = finding::of_drift(drift, results.without);
+        // What is left of it, by the error of its estimate, may resemble other errors of the clocks.
+        findings.retain(|own| own.first() == found.first() || !own.names(found.first()));
+        if found.is_unlisted() || !finding::add_offset(&mut findings, &found) {
+            findings.push(found);
+        }
+    }
     for offset in results.clocks {
         let found = finding::of_clock(offset, results.without);
         if offset.runs.is_some() || !finding::add_offset(&mut findings, &found) {

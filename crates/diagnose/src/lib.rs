@@ -15,6 +15,7 @@ mod candidate;
 mod carry_over;
 mod cause;
 mod check;
+mod clock_drift;
 mod clock_offsets;
 mod covariate_tests;
 mod covariates;

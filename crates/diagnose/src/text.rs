@@ -221,6 +221,10 @@ fn basis(finding: &Finding) -> String {
                 if *offset_s > 0.0 { "before" } else { "after" }
             )
         }
+        Basis::ClockDrift(rate) => {
+            let gains = if *rate > 0.0 { "gains" } else { "loses" };
+            format!("the robot's clock {gains} {:.3} % on the instrument's", 100.0 * rate.abs())
+        }
         Basis::Anomalies(all) => anomalies(all),
         Basis::RecordFault(sentence) => sentence.clone(),
         Basis::IsolatedErrors(isolated, of) => {

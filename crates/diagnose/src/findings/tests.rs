@@ -37,6 +37,7 @@ fn results<'e, 'a>(datasets: &'e [Dataset], structure: &'e MeanStructure<'a>) ->
         spans: None,
         faults: &[],
         clocks: &[],
+        drift: None,
         stamps: None,
         anomalies: &[],
         uncorrelated: false,

@@ -69,6 +69,30 @@ pub(crate) const MIN_CLOCK_PAIRS: usize = 30;
 /// Budgeted: a run takes a few milliseconds.
 pub(crate) const MAX_CLOCK_PAIRS: usize = 600;
 
+/// Number. A drift of the clocks is sought between so many parts of a long run.
+/// Budgeted: a clock that is off by a hundredth is off by less than a second within one of ten minutes.
+pub(crate) const DRIFT_PARTS_PER_RUN: usize = 8;
+
+/// Seconds. Runs of this length and more are long.
+/// Budgeted: in a part of it are as many pairs of poses as an offset needs, at five a second.
+pub(crate) const MIN_DRIFT_RUN_S: f64 = 60.0;
+
+/// Number. Fewer parts do not say that an offset grows evenly.
+/// Derived: through two goes a line, and of three one may be off.
+pub(crate) const MIN_DRIFT_PARTS: usize = 4;
+
+/// Number. Of more parts so many are taken.
+/// Budgeted: two thousand lines go through pairs of them.
+pub(crate) const MAX_DRIFT_PARTS: usize = 64;
+
+/// Seconds a second. No clock drifts by more.
+/// Convention: the upper end of what users report is 3 %.
+pub(crate) const MAX_CLOCK_RATE: f64 = 0.05;
+
+/// Number. Times that a drift is set right, and what is left is sought again.
+/// Budgeted: of a line through the first parts of a log a tenth is left, and a hundredth after the next.
+pub(crate) const MAX_DRIFT_STEPS: usize = 4;
+
 /// Relative. Prior standard deviation of the wheels' sizes.
 /// Convention: wheels are known to a few per cent.
 pub(crate) const WHEEL_PRIOR_SIGMA: f64 = 0.05;

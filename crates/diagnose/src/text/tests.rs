@@ -137,6 +137,8 @@ fn a_clock_is_before_or_after_and_of_its_runs() {
     assert!(
         of(-0.3, &["a"]).ends_with("300 ms after their stamps, in run a alone, which is left out of everything else")
     );
+    assert_eq!(basis_of(Basis::ClockDrift(-4e-3), None), "the robot's clock loses 0.400 % on the instrument's");
+    assert!(basis_of(Basis::ClockDrift(4e-3), None).contains("gains 0.400 %"));
     assert!(of(0.3, &["a", "b"]).ends_with("in runs a, b, which are left out of everything else"));
 }
 
