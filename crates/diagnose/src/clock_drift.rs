@@ -141,8 +141,8 @@ fn line_of(parts: &[Part], of_session: bool) -> Option<Line> {
     Some(if slope.is_finite() { Line { at_start_s: (y - slope * x) / n, slope } } else { line })
 }
 
-/// Negative log likelihood of a line. An offset is known no better than clocks are told apart: within that a
-/// part loses no more than in proportion to the square, and beyond it no more than a cap, whatever its
+/// Negative log likelihood of a line. An offset is known no better than clocks are discriminated: within that
+/// a part loses no more than in proportion to the square, and beyond it no more than a cap, whatever its
 /// profile says.
 fn cost(parts: &[Part], of_session: bool, line: Line) -> f64 {
     let of = |part: &Part| {
