@@ -57,7 +57,8 @@ struct Line {
 /// it.
 pub(crate) fn clock_drift(datasets: &[Dataset], min_offset_s: f64) -> Option<(ClockDrift, Vec<Dataset>)> {
     let parts = parts_of(datasets);
-    let lines = [false, true].map(|of_session| Some((of_session, drift_of(&parts, of_session, min_offset_s)?)));
+    // In a single run both are one, and the last of equals is taken: the run's.
+    let lines = [true, false].map(|of_session| Some((of_session, drift_of(&parts, of_session, min_offset_s)?)));
     let (of_session, (first, mut gain)) = lines.into_iter().flatten().max_by(|a, b| a.1.1.total_cmp(&b.1.1))?;
     let mut records = datasets.to_vec();
     let (mut line, mut kept) = (first, 1.0);
