@@ -15,6 +15,7 @@ use crate::carry_over::{CarryOver, carry_over};
 use crate::check::TestResult;
 use crate::clock_drift::clock_drift;
 use crate::clock_offsets::clock_offsets;
+use crate::clock_profile::RunClock;
 use crate::detectability::detectability;
 use crate::document::{Document, Gain};
 use crate::finding::Finding;
@@ -182,8 +183,6 @@ struct Staged {
     diagnosis: Diagnosis,
     /// Nothing is compared across some intervals in which the robot may have moved.
     has_events: bool,
-    /// Something was added to the calibrated model's mean.
-    has_terms: bool,
     /// Share of the measurements that are outliers beside all that was found.
     outlier_share: f64,
 }
@@ -192,7 +191,7 @@ impl Staged {
     /// Whether what was found with all intervals compared explains what happened in those of another: as a
     /// castor turns a robot wherever it reverses. Where it does not, what follows an event are outliers.
     fn explains_events_of(&self, cut: &Self) -> bool {
-        self.has_terms && self.outlier_share <= cut.outlier_share
+        !self.diagnosis.found.candidates.is_empty() && self.outlier_share <= cut.outlier_share
     }
 }
 
@@ -212,9 +211,10 @@ fn stages(
     let by_counts = stamp_error_by_counts(datasets, &every_term);
     let recorded = datasets;
     let datasets = by_counts.as_ref().map_or(datasets, |error| &error.records[..]);
-    let drift = clock_drift(datasets, before_fit.min_common_clock_s);
-    let (drift, datasets) = drift.as_ref().map_or((None, datasets), |(drift, records)| (Some(drift), &records[..]));
-    let clocks = clock_offsets(datasets, before_fit.min_common_clock_s);
+    let of_runs = RunClock::of_all(datasets);
+    let drift = clock_drift(datasets, &of_runs, before_fit.min_common_clock_s);
+    let (datasets, of_runs) = drift.as_ref().map_or((datasets, &of_runs), |found| (&found.records[..], &found.clocks));
+    let clocks = clock_offsets(datasets, of_runs, before_fit.min_common_clock_s);
     let datasets = clocks.records.as_deref().unwrap_or(datasets);
     let odd = unknown_motions(datasets, clocks.remaining_s, uncertain_tick_s(recorded), before_fit.events);
     let (datasets, anomalies) =
@@ -295,7 +295,7 @@ fn stages(
         spans: spans.as_ref(),
         faults: &faults,
         clocks: &clocks.offsets,
-        drift,
+        drift: drift.as_ref().map(|found| &found.drift),
         stamps,
         anomalies,
         uncorrelated: is_uncorrelated,
@@ -360,7 +360,6 @@ fn stages(
     let (found, carried) = (FittedModel::of(model), FittedModel::of(&carried));
     Ok(Staged {
         has_events: anomalies.iter().any(|anomaly| anomaly.kind == AnomalyKind::RobotOrFrame),
-        has_terms: !model.candidates.is_empty(),
         outlier_share: rejected_share(&model.fit),
         diagnosis: Diagnosis {
             document,

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use effects::{CATALOGUE, Hypothesis, Sign, hypothesis};
+use effects::{CATALOGUE, Description, Hypothesis, Sign, hypothesis};
 use estimation::{ModelFit, NoiseComponent};
 
 use crate::candidate::Candidate;
@@ -321,14 +321,17 @@ pub(crate) fn of_wrong_wheels(factor: f64, without: &[String]) -> Option<Finding
     Some(of_causes(vec![cause], 0.0, BTreeMap::from([(size.to_owned(), value)]), Basis::WheelFactor(factor)))
 }
 
+/// The effect of the catalogue of which something is known, and what, among those that may be named.
+fn nameable<T>(known: impl Fn(Description) -> Option<T>, without: &[String]) -> Option<(&'static str, T)> {
+    let mut nameable = CATALOGUE.iter().copied().filter(|id| !without.iter().any(|out| out == id));
+    nameable.find_map(|id| Some((id, known(effects::description(id)?)?)))
+}
+
 /// Geometry that is not that of the described robot.
 pub(crate) fn of_geometry(deviation: GeometryDeviation, without: &[String]) -> Finding {
-    let ratio_of = |id: &'static str| {
-        let (of, name) = effects::description(id)?.geometry?;
-        (of == deviation.of && !without.iter().any(|out| out == id)).then_some((id, name))
-    };
-    let (mut causes, parameters) = match CATALOGUE.iter().copied().find_map(ratio_of) {
-        Some((id, name)) => {
+    let ratio_of = |description: Description| description.geometry.filter(|(of, _)| *of == deviation.of);
+    let (mut causes, parameters) = match nameable(ratio_of, without) {
+        Some((id, (_, name))) => {
             let value = Value { value: deviation.ratio, sigma: Some(deviation.sigma), unit: "1".to_owned() };
             (vec![Cause::Effect(id)], BTreeMap::from([(name.to_owned(), value)]))
         }
@@ -343,13 +346,12 @@ pub(crate) fn of_geometry(deviation: GeometryDeviation, without: &[String]) -> F
 
 /// The finding of a clock that is far off.
 pub(crate) fn of_clock(offset: &ClockOffset, without: &[String]) -> Finding {
-    let parameter_of = |id: &'static str| effects::description(id)?.clock_offset.map(|name| (id, name));
-    let (cause, parameters) = match CATALOGUE.iter().copied().find_map(parameter_of) {
-        Some((id, name)) if !without.iter().any(|out| out == id) => {
+    let (cause, parameters) = match nameable(|description| description.clock_offset, without) {
+        Some((id, name)) => {
             let value = Value { value: offset.offset_s, sigma: Some(offset.sigma_s), unit: "s".to_owned() };
             (Cause::Effect(id), BTreeMap::from([(name.to_owned(), value)]))
         }
-        _ => (Cause::Unknown, BTreeMap::new()),
+        None => (Cause::Unknown, BTreeMap::new()),
     };
     let basis = Basis::ClockOffset(offset.offset_s);
     let found = of_causes(vec![cause], p_of_chi_square(2.0 * offset.gain, 1.0), parameters, basis);
@@ -358,15 +360,13 @@ pub(crate) fn of_clock(offset: &ClockOffset, without: &[String]) -> Finding {
 
 /// The finding of a clock that runs fast or slow.
 pub(crate) fn of_drift(drift: &ClockDrift, without: &[String]) -> Finding {
-    let is_rate = |id: &&'static str| effects::description(id).is_some_and(|description| description.is_clock_rate);
     let rate = Value { value: drift.rate, sigma: Some(drift.sigma), unit: "1".to_owned() };
     let since = Value { value: 1.0, sigma: None, unit: "1".to_owned() };
     let since = drift.of_session.then(|| ("since_session_start".to_owned(), since));
-    let (cause, parameters) = match CATALOGUE.iter().copied().find(is_rate) {
-        Some(id) if !without.iter().any(|out| out == id) => {
-            (Cause::Effect(id), [("rate".to_owned(), rate)].into_iter().chain(since).collect())
-        }
-        _ => (Cause::Unknown, BTreeMap::new()),
+    let is_clock_rate = |description: Description| description.is_clock_rate.then_some(());
+    let (cause, parameters) = match nameable(is_clock_rate, without) {
+        Some((id, ())) => (Cause::Effect(id), [("rate".to_owned(), rate)].into_iter().chain(since).collect()),
+        None => (Cause::Unknown, BTreeMap::new()),
     };
     of_causes(vec![cause], p_of_chi_square(2.0 * drift.gain, 1.0), parameters, Basis::ClockDrift(drift.rate))
 }

@@ -17,6 +17,7 @@ mod cause;
 mod check;
 mod clock_drift;
 mod clock_offsets;
+mod clock_profile;
 mod covariate_tests;
 mod covariates;
 mod detectability;

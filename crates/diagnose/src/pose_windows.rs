@@ -13,7 +13,7 @@ use kinematics::{Increment, Pose, Wheels, wrap_to_pi};
 use nalgebra::{Matrix2, Matrix3, Matrix3x4, Matrix4, Vector2, Vector3, Vector4};
 use rayon::prelude::*;
 
-use crate::clock_offsets::turns_at;
+use crate::clock_profile::turns_at;
 use crate::log_rows::has_outlying_rows;
 use crate::settings::records::{
     MIN_GAP_RATIO, MIN_WINDOW_POSES, MIN_WINDOWS_PER_EXTRINSICS, REWEIGHTINGS, WINDOW_DISTANCE_SEPARATIONS,
@@ -334,7 +334,7 @@ mod tests {
     use dataset::{Odometry, Run, RunInfo, WheelLog};
 
     use super::*;
-    use crate::clock_offsets::tests::driven;
+    use crate::clock_profile::tests::driven;
 
     #[test]
     fn windows_have_the_rows_between_their_poses_and_know_where_some_are_missing() {

@@ -90,7 +90,8 @@ pub(crate) const MAX_DRIFT_PARTS: usize = 64;
 pub(crate) const MAX_CLOCK_RATE: f64 = 0.05;
 
 /// Number. Times that a drift is set right, and what is left is sought again.
-/// Budgeted: of a line through the first parts of a log a tenth is left, and a hundredth after the next.
+/// Budgeted: a line through the first half of a log leaves a third of the drift, and the next one a
+/// hundredth.
 pub(crate) const MAX_DRIFT_STEPS: usize = 4;
 
 /// Relative. Prior standard deviation of the wheels' sizes.
