@@ -115,9 +115,10 @@ fn mean_effects(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> V
 fn clocks(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
     if let Some(drift) = results.drift {
         let found = finding::of_drift(drift, results.without);
+        let is_named = !found.is_unlisted();
         // What is left of it, by the error of its estimate, may resemble other errors of the clocks.
-        findings.retain(|own| own.first() == found.first() || !own.names(found.first()));
-        if found.is_unlisted() || !finding::add_offset(&mut findings, &found) {
+        findings.retain(|own| !is_named || own.first() == found.first() || !own.names(found.first()));
+        if !is_named || !finding::add_offset(&mut findings, &found) {
             findings.push(found);
         }
     }

@@ -111,6 +111,26 @@ fn scatter_is_of_effects_without_sizes() {
 }
 
 #[test]
+fn a_drift_takes_its_remainder_and_one_without_a_name_takes_nothing() {
+    let datasets = [session(0, 0.0)];
+    let structure = structure(&datasets, &[]);
+    let drift = ClockDrift { rate: 4e-3, sigma: 1e-5, of_session: false, gain: 50.0 };
+    let of = |without: &[String], causes: Vec<Cause>| {
+        let before = Finding { causes, ..mean("slip_speed", 9.0) };
+        let results = StageResults { drift: Some(&drift), without, ..results(&datasets, &structure) };
+        let all = clocks(&results, vec![before]);
+        all.iter().map(|finding| finding.first().id()).collect::<Vec<_>>()
+    };
+    let (slip, rate) = (Cause::Effect("slip_speed"), Cause::Effect("clock_rate"));
+    assert_eq!(of(&[], vec![slip.clone()]), ["slip_speed", "clock_rate"]);
+    // A set that holds the clock is what its estimate left, and the clock itself is one finding.
+    assert_eq!(of(&[], vec![slip.clone(), rate.clone()]), ["clock_rate"]);
+    assert_eq!(of(&[], vec![rate]), ["clock_rate"]);
+    // Left out of the catalogue it has no name, and what is doubted stays.
+    assert_eq!(of(&["clock_rate".to_owned()], vec![slip, Cause::Unknown]), ["slip_speed", "unlisted"]);
+}
+
+#[test]
 fn failed_checks_are_reported_where_nothing_explains_them() {
     let datasets = [session(0, 0.0)];
     let speed = || Check::Covariate("speed".to_owned());
