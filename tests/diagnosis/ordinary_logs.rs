@@ -14,6 +14,11 @@ use crate::plain_robot::{Event, PlainRobot, Reports, Stamps};
 fn diagnosed(robot: &PlainRobot) -> Result<Document, String> {
     let folder = tempfile::tempdir().expect("a temporary folder");
     robot.write(folder.path());
+    if let Ok(keep) = std::env::var("YAIR_KEEP") {
+        if !std::path::Path::new(&keep).exists() {
+            robot.write(std::path::Path::new(&keep));
+        }
+    }
     let dataset = dataset::read(folder.path()).expect("a dataset").dataset;
     let found = diagnose(std::slice::from_ref(&dataset), &Options::default());
     found.map(|found| found.document).map_err(|error| error.to_string())
@@ -85,6 +90,39 @@ const KINDS: &[(&str, Change, &[&str])] = &[
     ("four runs", |of| of.runs = 4, &[]),
     ("one long log", |of| of.joined = true, &[]),
     ("3 % of rows lost", |of| of.lost_rows = 0.03, &["dropped_samples"]),
+    ("rows where counts change", |of| of.logs_changes_alone = true, &["dropped_samples"]),
+    (
+        "rows where counts change, 500 ticks",
+        |of| (of.logs_changes_alone, of.ticks_per_rev) = (true, 500.0),
+        &["dropped_samples"],
+    ),
+    ("stamps of whole milliseconds at 30 Hz", |of| (of.odometry_hz, of.stamps) = (30.0, Stamps::RoundedTo(1e-3)), &[]),
+    (
+        "stamps of whole hundredths at 30 Hz",
+        |of| (of.odometry_hz, of.stamps) = (30.0, Stamps::RoundedTo(1e-2)),
+        &["interval_error"],
+    ),
+    ("rows sent by five", |of| of.rows_per_packet = 5, &["interval_error"]),
+    ("logs that begin in motion", |of| of.starts_moving = true, &[]),
+    ("truth that pauses for 3 s", |of| of.truth_pause_s = Some([3.0, 6.0]), &[]),
+    ("30 % of poses lost", |of| of.lost_poses = 0.3, &[]),
+    ("2 % outliers", |of| of.outliers = 0.02, &["truth_outliers"]),
+    ("10 % outliers", |of| of.outliers = 0.1, &["truth_outliers"]),
+    ("errors stated half", |of| of.stated = 0.5, &[]),
+    ("errors stated fivefold", |of| of.stated = 5.0, &[]),
+    ("errors not stated", |of| of.stated = 0.0, &[]),
+    ("errors correlated over 1 s", |of| of.truth_tau_s = 1.0, &["truth_correlated_noise"]),
+    ("errors correlated over 0.1 s", |of| of.truth_tau_s = 0.1, &["truth_correlated_noise"]),
+    ("errors that grow with distance", |of| of.truth_grows_per_m = 1.0, &["unlisted", "truth_outliers"]),
+    ("headings within half a turn", |of| of.wraps = true, &[]),
+    ("headings within half a turn at 1 Hz", |of| (of.wraps, of.truth_hz) = (true, 1.0), &[]),
+    ("truth at 100 Hz of 0.2 mm", |of| (of.truth_hz, of.truth_sigma_m, of.truth_sigma_rad) = (100.0, 2e-4, 4e-4), &[]),
+    ("truth of 2 cm and 20 mrad", |of| (of.truth_sigma_m, of.truth_sigma_rad) = (2e-2, 2e-2), &[]),
+    (
+        "positions of 5 mm at 1 Hz",
+        |of| (of.reports, of.truth_sigma_m, of.truth_hz) = (Reports::Positions, 5e-3, 1.0),
+        &[],
+    ),
 ];
 
 /// Kinds whose name has the text of YAIR_KIND in it; all without.
@@ -153,6 +191,30 @@ const FAULTS: &[(&str, Change, &str)] = &[
         "a clock that is 0.1 % fast since the session began",
         |of| (of.clock_gain, of.clock_runs_on) = (1e-3, true),
         "clock_rate",
+    ),
+    ("play of 2 mm", |of| of.gap_m = 2e-3, "backlash"),
+    ("play of 2 mm, positions", |of| (of.gap_m, of.reports) = (2e-3, Reports::Positions), "backlash"),
+    ("slip with speed", |of| of.slip_s_m = 0.02, "slip_speed"),
+    ("slip with speed, one long log", |of| (of.slip_s_m, of.joined) = (0.02, true), "slip_speed"),
+    ("wheelbase that grows", |of| of.base_grows_s = 0.02, "turn_rate_wheelbase"),
+    (
+        "wheelbase that grows, 500 ticks",
+        |of| (of.base_grows_s, of.ticks_per_rev) = (0.02, 500.0),
+        "turn_rate_wheelbase",
+    ),
+    ("right counter late by 2 ms", |of| of.right_late_s = 2e-3, "sampling_skew"),
+    ("truth filtered over 0.1 s", |of| of.truth_filter_s = 0.1, "truth_latency"),
+    ("a slippery patch", |of| of.slippery_band = Some([0.0, 0.6]), "unlisted"),
+    ("counts lost in bursts", |of| of.bursts_per_s = 0.02, "unlisted"),
+    (
+        "a clock set back by 0.2 s in one run",
+        |of| of.events = vec![(5, Event::ClockStep { at_s: 4.0, by_s: -0.2 })],
+        "unlisted",
+    ),
+    (
+        "a clock set on by 0.3 s in one run",
+        |of| of.events = vec![(5, Event::ClockStep { at_s: 4.0, by_s: 0.3 })],
+        "unlisted",
     ),
     // Not normal, and no large errors: neither bumps nor outliers.
     ("uniform errors of the instrument", |of| of.has_uniform_errors = true, "unlisted"),

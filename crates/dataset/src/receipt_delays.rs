@@ -258,7 +258,7 @@ pub(crate) struct Received {
 impl Received {
     /// By stamps that do not fall; `None` where rows do not hold up each other.
     pub(crate) fn of(t_s: &[f64]) -> Option<Self> {
-        let (gap_s, held_up) = bunches(t_s)?;
+        let (gap_s, held_up) = rows_on_heels(t_s)?;
         let rows = |lost: f64, most: usize| {
             let period_s = gap_s / (1.0 + lost);
             let late = (0..most).map(|row| (t_s[row] - t_s[0]) / period_s - row as f64).collect();
@@ -310,11 +310,11 @@ impl Received {
 /// rows that are missing.
 #[must_use]
 pub fn has_bunched_rows(t_s: &[f64]) -> bool {
-    bunches(t_s).is_some()
+    rows_on_heels(t_s).is_some()
 }
 
 /// Time from row to row, and which rows came on the heels of the one before; `None` where hardly any did.
-fn bunches(t_s: &[f64]) -> Option<(f64, Vec<bool>)> {
+pub(crate) fn rows_on_heels(t_s: &[f64]) -> Option<(f64, Vec<bool>)> {
     let gap_s = slope_s(t_s)?;
     let is_held_up = |pair: &[f64]| pair[1] - pair[0] < HELD_UP_GAP * gap_s;
     let held_up: Vec<bool> = std::iter::once(false).chain(t_s.windows(2).map(is_held_up)).collect();

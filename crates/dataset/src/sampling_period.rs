@@ -7,15 +7,14 @@
 //! itself, and what waited behind it. The numbers are the likeliest path through both (Viterbi 1967), each
 //! path with its own idea of how late rows usually are, so that a clock need not keep one beat all day.
 
+use crate::lateness::{LINE_ROWS, is_alone, lateness, lateness_of_ticks};
 use crate::median::median;
+use crate::packets;
 use crate::receipt_delays::Received;
 use crate::row_numbers::likeliest_numbers;
 
 /// Rows from which on a log has a beat: the line through so many is off by a fifth of what stamps jitter by.
 const MIN_ROWS: usize = 24;
-/// Rows to either side whose line is the beat: 500 rows know it to a twentieth of what stamps jitter by, and
-/// in five seconds a clock keeps its beat.
-const LINE_ROWS: usize = 250;
 /// Rounds in which beat and numbers are found from each other, at the most: each mends what numbers that were
 /// wrong do to the beat.
 const ROUNDS: usize = 5;
@@ -71,10 +70,12 @@ impl SamplingPeriod {
         if t_s.len() < MIN_ROWS {
             return None;
         }
+        if let Some(of_packets) = packets::sampling_period(t_s) {
+            return Some(of_packets);
+        }
         if let Some(received) = Received::of(t_s) {
             let late_s: Vec<f64> = t_s.iter().zip(&received.read_s).map(|(t_s, read_s)| t_s - read_s).collect();
-            let (period_s, numbers, off_s) = (received.period_s, received.numbers(), root_mean_square(&late_s));
-            return Some(Self { period_s, numbers, late_s, is_bunched: true, off_s });
+            return Some(Self::received(received.period_s, received.numbers(), late_s));
         }
         let gap_s = median(t_s.windows(2).map(|pair| pair[1] - pair[0]).collect())?;
         // The middle gap is exact where stamps are.
@@ -107,6 +108,12 @@ impl SamplingPeriod {
         let of_ticks_s = lateness_of_ticks(&numbers, &late_s);
         let late_s = if root_mean_square(&of_ticks_s) < MAX_JITTER_BESIDE * period_s { of_ticks_s } else { late_s };
         Some(Self { period_s, numbers, late_s, is_bunched: false, off_s })
+    }
+
+    /// Of rows that hold up each other, with what each is late by.
+    pub(crate) fn received(period_s: f64, numbers: Vec<i64>, late_s: Vec<f64>) -> Self {
+        let off_s = root_mean_square(&late_s);
+        Self { period_s, numbers, late_s, is_bunched: true, off_s }
     }
 
     /// Whether stamps are near enough to the beat that the numbers of all rows are right.
@@ -251,79 +258,6 @@ fn numbers_beside_rows_of_their_own(t_s: &[f64], period_s: f64) -> Option<Vec<i6
     }
     let is_some = by_themselves > 0 && by_themselves as f64 <= MAX_SHARE_BY_THEMSELVES * t_s.len() as f64;
     is_some.then_some(numbers)
-}
-
-/// Whether no neighbour has a row's number; numbers do not fall.
-fn is_alone(numbers: &[i64], row: usize) -> bool {
-    let number = Some(&numbers[row]);
-    row.checked_sub(1).is_none_or(|before| numbers.get(before) != number) && numbers.get(row + 1) != number
-}
-
-/// How late each stamp is against the line through the rows around it that are alone of their ticks: one that
-/// came by itself is on no line. Through all of them where hardly any is alone.
-fn lateness(t_s: &[f64], numbers: &[i64], period_s: f64) -> Vec<f64> {
-    let rows = t_s.len();
-    // Sums of a window slide along; times over numbers stay small for precision.
-    let mut sums = Sums::default();
-    let (mut from, mut to) = (0, 0);
-    let point = |row: usize| (numbers[row] as f64, t_s[row] - period_s * numbers[row] as f64);
-    let most_are = (0..rows).filter(|row| is_alone(numbers, *row)).count() * 2 > rows;
-    let weight = |row: usize| if is_alone(numbers, row) || !most_are { 1.0 } else { 0.0 };
-    let late = |row: usize| {
-        while to < rows.min(row + LINE_ROWS + 1) {
-            sums.add(point(to), weight(to));
-            to += 1;
-        }
-        while from + LINE_ROWS < row {
-            sums.add(point(from), -weight(from));
-            from += 1;
-        }
-        let (number, rest_s) = point(row);
-        rest_s - sums.line_at(number)
-    };
-    (0..rows).map(late).collect()
-}
-
-/// The lateness of each tick's row, the nearest of several; 0 of the others, which came by themselves.
-fn lateness_of_ticks(numbers: &[i64], late_s: &[f64]) -> Vec<f64> {
-    let mut of_ticks_s = vec![0.0; late_s.len()];
-    let mut first = 0;
-    for of_tick in numbers.chunk_by(|number, next| number == next) {
-        let rows = first..first + of_tick.len();
-        first = rows.end;
-        if let Some(nearest) = rows.min_by(|a, b| late_s[*a].abs().total_cmp(&late_s[*b].abs())) {
-            of_ticks_s[nearest] = late_s[nearest];
-        }
-    }
-    of_ticks_s
-}
-
-/// Sums of a line through points.
-#[derive(Default)]
-struct Sums {
-    count: f64,
-    x: f64,
-    y: f64,
-    xx: f64,
-    xy: f64,
-}
-
-impl Sums {
-    fn add(&mut self, (x, y): (f64, f64), times: f64) {
-        self.count += times;
-        self.x += times * x;
-        self.y += times * y;
-        self.xx += times * x * x;
-        self.xy += times * x * y;
-    }
-
-    /// The line at a point; the mean where it has no slope.
-    fn line_at(&self, x: f64) -> f64 {
-        let (mean_x, mean_y) = (self.x / self.count, self.y / self.count);
-        let square = self.xx - self.count * mean_x * mean_x;
-        let slope = if square > 0.5 * self.count { (self.xy - self.count * mean_x * mean_y) / square } else { 0.0 };
-        mean_y + slope * (x - mean_x)
-    }
 }
 
 #[cfg(test)]

@@ -67,6 +67,8 @@ pub(crate) enum Basis {
     LargeErrors(ResidualPersistence),
     /// Autocorrelated errors with this coefficient.
     Autocorrelated(f64),
+    /// The same where the instrument's errors are not while the robot stands.
+    AutocorrelatedInMotion(f64),
     /// Headings scatter with the turn, rad/√rad.
     TurnScatter(f64),
 }
@@ -74,7 +76,14 @@ pub(crate) enum Basis {
 impl Basis {
     /// Whether what an effect in the model leaves, its form being known roughly, may give such a finding.
     pub(crate) const fn may_be_error_of_form(&self) -> bool {
-        matches!(self, Self::FailedTests(_) | Self::LargeErrors(_) | Self::Autocorrelated(_) | Self::TurnScatter(_))
+        matches!(
+            self,
+            Self::FailedTests(_)
+                | Self::LargeErrors(_)
+                | Self::Autocorrelated(_)
+                | Self::AutocorrelatedInMotion(_)
+                | Self::TurnScatter(_)
+        )
     }
 }
 

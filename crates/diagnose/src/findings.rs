@@ -165,7 +165,7 @@ fn noise_effects(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> 
     if results.uncorrelated {
         findings.push(finding::of_uncorrelated(&results.structure.base));
     } else if !results.restored() {
-        let mut signs = scatter(results.structure, results.without);
+        let mut signs = scatter(results.structure, results.recorded, results.without);
         signs.retain(|sign| !findings.iter().any(|finding| sign.names(finding.first())));
         findings.extend(signs);
     }

@@ -23,6 +23,7 @@ mod covariates;
 mod detectability;
 mod diagnosis;
 mod document;
+mod errors_at_rest;
 mod extended_model;
 mod extended_scenario;
 mod finding;

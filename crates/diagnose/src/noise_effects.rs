@@ -7,6 +7,7 @@
 
 use std::collections::BTreeMap;
 
+use dataset::Dataset;
 use effects::Sign;
 use estimation::NoiseComponent;
 
@@ -15,6 +16,7 @@ use crate::candidate::terms;
 use crate::cause::{Basis, Cause, Doubt};
 use crate::check::{Check, Component, ResidualPersistence};
 use crate::document::Value;
+use crate::errors_at_rest::are_white_at_rest;
 use crate::finding;
 use crate::finding::Finding;
 use crate::mean_structure::MeanStructure;
@@ -29,8 +31,8 @@ use crate::settings::residuals::{
 use crate::statistics::{p_of_chi_square, p_of_z};
 use crate::turn_to_turn::differs_from_turn_to_turn;
 
-/// Scatter that failed checks show.
-pub(crate) fn scatter(structure: &MeanStructure<'_>, without_ids: &[String]) -> Vec<Finding> {
+/// Scatter that failed checks show, and the datasets as they were recorded.
+pub(crate) fn scatter(structure: &MeanStructure<'_>, recorded: &[Dataset], without_ids: &[String]) -> Vec<Finding> {
     let mut findings = Vec::new();
     let outliers = structure.checked.outliers;
     let tests = &structure.checked.checks;
@@ -121,7 +123,13 @@ pub(crate) fn scatter(structure: &MeanStructure<'_>, without_ids: &[String]) -> 
         if !causes.is_empty() && (structure.spurious || !structure.found.model.candidates.is_empty()) {
             causes.push(Cause::Unknown);
         }
-        let basis = Basis::Autocorrelated(coefficient);
+        let mut basis = Basis::Autocorrelated(coefficient);
+        // An instrument errs while the robot stands, too, unless its errors go with the place.
+        if are_white_at_rest(recorded, coefficient) == Some(true) {
+            causes.retain(|cause| !cause.is_unlisted());
+            causes.insert(0, Cause::Unknown);
+            basis = Basis::AutocorrelatedInMotion(coefficient);
+        }
         findings.push(finding::of_causes(causes, p_of_z(sigmas), BTreeMap::new(), basis));
     }
     findings.extend(turns);

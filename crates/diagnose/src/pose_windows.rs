@@ -10,7 +10,7 @@
 use dataset::{Dataset, TruthSample};
 use estimation::WheelAngleInterpolator;
 use kinematics::{Increment, Pose, Wheels, wrap_to_pi};
-use nalgebra::{Matrix2, Matrix3, Matrix3x4, Matrix4, Vector2, Vector3, Vector4};
+use nalgebra::{Matrix2, Matrix3, Matrix4, Vector2, Vector3, Vector4};
 use rayon::prelude::*;
 
 use crate::clock_profile::turns_at;
@@ -189,7 +189,7 @@ impl<'t> CalibratedTracks<'t> {
             .zip(&dead_reckoned)
             .flat_map(|(track, poses)| extrinsics_rows(track, poses, windows(track.len(), span)))
             .collect();
-        let (extrinsics, _) = Extrinsics::of(&rows)?;
+        let extrinsics = Extrinsics::of(&rows)?;
         let scale = extrinsics.scale();
         drive.scale = drive.scale.map(|of| of / scale);
         drive.separation_m /= scale;
@@ -217,7 +217,7 @@ impl<'t> CalibratedTracks<'t> {
     }
 
     /// The instrument's place on the robot in a track, with its covariance (x, y, heading), by the windows
-    /// that are taken.
+    /// that are taken. The wheels' scale is that of all tracks: on a circle a scale and a lever arm are one.
     pub(crate) fn extrinsics(
         &self,
         track: usize,
@@ -229,12 +229,7 @@ impl<'t> CalibratedTracks<'t> {
         if rows.len() < MIN_WINDOWS_PER_EXTRINSICS {
             return None;
         }
-        let (extrinsics, covariance) = Extrinsics::of(&rows)?;
-        // The heading is that of (cos, sin).
-        let ([cos, sin, ..], scale) = (extrinsics.0.data.0[0], extrinsics.scale());
-        let per = scale * scale;
-        let to = Matrix3x4::new(0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, -sin / per, cos / per, 0.0, 0.0);
-        Some((extrinsics.body_from_sensor(), to * covariance * to.transpose()))
+        mounting(&rows, self.body_from_sensor)
     }
 }
 
@@ -262,7 +257,8 @@ fn span(tracks: &[PoseTrack], separation_m: f64) -> Option<usize> {
 }
 
 /// One window in the linear equation of the extrinsics: the motion by the instrument, that by the wheels, and
-/// the turn.
+/// the turn by the wheels, whose errors are the smaller ones: what an instrument errs by in its headings
+/// would count as turns that determine a lever arm.
 struct ExtrinsicsRow {
     measured: Vector2<f64>,
     dead_reckoned: Vector2<f64>,
@@ -279,34 +275,61 @@ fn extrinsics_rows<'t>(
         ExtrinsicsRow {
             measured: Vector2::new(measured.x_m, measured.y_m),
             dead_reckoned: Vector2::new(dead_reckoned.x_m, dead_reckoned.y_m),
-            turn_rad: measured.theta_rad,
+            turn_rad: dead_reckoned.theta_rad,
         }
     })
+}
+
+/// The instrument's place on the robot by some windows, near the one that is stated, with its covariance
+/// (x, y, heading) by what is left of them. The wheels' scale is known.
+fn mounting(rows: &[ExtrinsicsRow], near: Pose) -> Option<(Pose, Matrix3<f64>)> {
+    let mut of = near;
+    let (mut information, mut squares) = (Matrix3::identity(), 0.0);
+    for _ in 0..REWEIGHTINGS {
+        // What the windows do not determine stays near: a metre and a radian are weak enough.
+        information = Matrix3::from_diagonal_element(1e-6);
+        let mut score = -1e-6 * Vector3::new(of.x_m - near.x_m, of.y_m - near.y_m, of.theta_rad - near.theta_rad);
+        squares = 0.0;
+        let (sin_of, cos_of) = of.theta_rad.sin_cos();
+        for row in rows {
+            let (m, (sin, cos)) = (row.measured, row.turn_rad.sin_cos());
+            let seen = Vector2::new(cos_of * m.x - sin_of * m.y, sin_of * m.x + cos_of * m.y);
+            let design = [Vector3::new(1.0 - cos, sin, -seen.y), Vector3::new(-sin, 1.0 - cos, seen.x)];
+            let place = Vector3::new(of.x_m, of.y_m, 0.0);
+            let left = row.dead_reckoned - seen - Vector2::new(design[0].dot(&place), design[1].dot(&place));
+            let weight = 1.0 / left.norm().max(1e-4);
+            squares += weight * left.norm_squared();
+            for (design, left) in design.into_iter().zip([left.x, left.y]) {
+                information += weight * design * design.transpose();
+                score += weight * design * left;
+            }
+        }
+        let step = information.cholesky()?.solve(&score);
+        of = Pose::new(of.x_m + step.x, of.y_m + step.y, of.theta_rad + step.z);
+    }
+    let variance = squares / (2 * rows.len()).saturating_sub(3).max(1) as f64;
+    Some((of, information.try_inverse()? * variance))
 }
 
 /// g cos θ_s, g sin θ_s, ℓ_x, ℓ_y.
 struct Extrinsics(Vector4<f64>);
 
 impl Extrinsics {
-    /// The mounting of some windows with its covariance by what is left of them.
-    fn of(rows: &[ExtrinsicsRow]) -> Option<(Self, Matrix4<f64>)> {
+    /// The mounting that most windows say.
+    fn of(rows: &[ExtrinsicsRow]) -> Option<Self> {
         let design = |row: &ExtrinsicsRow| {
             let (m, (sin, cos)) = (row.measured, row.turn_rad.sin_cos());
             [Vector4::new(m.x, -m.y, 1.0 - cos, sin), Vector4::new(m.y, m.x, -sin, 1.0 - cos)]
         };
         let mut of = Vector4::new(1.0, 0.0, 0.0, 0.0);
-        let mut information = Matrix4::identity();
-        let mut squares = 0.0;
         for _ in 0..REWEIGHTINGS {
             // What the windows do not determine stays 0: a metre of lever arm is weak enough.
-            information = Matrix4::from_diagonal(&Vector4::new(1e-9, 1e-9, 1e-6, 1e-6));
+            let mut information = Matrix4::from_diagonal(&Vector4::new(1e-9, 1e-9, 1e-6, 1e-6));
             let mut score = Vector4::zeros();
-            squares = 0.0;
             for row in rows {
                 let [x, y] = design(row);
                 let left = Vector2::new(row.dead_reckoned.x - x.dot(&of), row.dead_reckoned.y - y.dot(&of));
                 let weight = 1.0 / left.norm().max(1e-4);
-                squares += weight * left.norm_squared();
                 for (design, value) in [(x, row.dead_reckoned.x), (y, row.dead_reckoned.y)] {
                     information += weight * design * design.transpose();
                     score += weight * design * value;
@@ -314,10 +337,8 @@ impl Extrinsics {
             }
             of = information.cholesky()?.solve(&score);
         }
-        let variance = squares / (2 * rows.len()).saturating_sub(4).max(1) as f64;
-        let covariance = information.try_inverse()? * variance;
         let scale = of[0].hypot(of[1]);
-        (scale > 0.0 && scale.is_finite()).then_some((Self(of), covariance))
+        (scale > 0.0 && scale.is_finite()).then_some(Self(of))
     }
 
     fn scale(&self) -> f64 {

@@ -240,6 +240,9 @@ fn basis(finding: &Finding) -> String {
         Basis::Autocorrelated(coefficient) => format!(
             "measurement errors are autocorrelated (lag-one coefficient {coefficient:.2}), and no term that was tried explains it"
         ),
+        Basis::AutocorrelatedInMotion(coefficient) => format!(
+            "errors are autocorrelated while the robot moves (lag-one coefficient {coefficient:.2}) and not while it stands: motions err for a while at a time, as where the floor differs"
+        ),
         Basis::TurnScatter(sigma) => format!("headings scatter with the turn, by {:.1} mrad/√rad", 1e3 * sigma),
     }
 }

@@ -15,6 +15,18 @@ pub(crate) const LOWEST_SIMULATED_Z: f64 = -1.0;
 /// Budgeted: what has a larger one fails no test at 1 %.
 pub(crate) const RESIMULATED_LEVEL: f64 = 0.01;
 
+/// Number. Poses of a robot that stands which say whether the instrument's errors last.
+/// Derived: the lag-one coefficient of so many is known to 0.18.
+pub(crate) const MIN_POSES_AT_REST: usize = 30;
+
+/// Seconds before and after a pose in which no wheel turns, for the robot to stand.
+/// Budgeted: what an instrument is late by, or lags, in published logs.
+pub(crate) const REST_MARGIN_S: f64 = 0.3;
+
+/// Log odds for white errors of a robot that stands over ones as autocorrelated as those of its drives.
+/// Convention: strong evidence, 20 to 1.
+pub(crate) const WHITE_AT_REST_LOG_ODDS: f64 = 3.0;
+
 /// Number. Lags of the whiteness test.
 /// Tuned: by hand; no record of what on.
 pub(crate) const WHITENESS_LAGS: usize = 5;

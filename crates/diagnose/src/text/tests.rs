@@ -118,6 +118,7 @@ fn every_basis_is_said_with_its_numbers() {
     assert_eq!(of(Basis::RecordFault("swapped".to_owned())), "swapped");
     assert!(of(Basis::IsolatedErrors(3, 200)).starts_with("3 of 200 measurements are isolated"));
     assert!(of(Basis::Autocorrelated(0.456)).contains("(lag-one coefficient 0.46)"));
+    assert!(of(Basis::AutocorrelatedInMotion(0.456)).contains("(lag-one coefficient 0.46) and not while it stands"));
     let errors = [ResidualPersistence::Persistent, ResidualPersistence::Reverting, ResidualPersistence::Undecided];
     let errors = errors.map(|persistence| of(Basis::LargeErrors(persistence)));
     assert!(errors[0].contains("persist") && errors[1].contains("reverts") && errors[2].contains("heavier tails"));

@@ -1,0 +1,78 @@
+//! How late rows are stamped, against the beat of the rows around them.
+
+/// Rows to either side whose line is the beat: 500 rows know it to a twentieth of what stamps jitter by, and
+/// in five seconds a clock keeps its beat.
+pub(crate) const LINE_ROWS: usize = 250;
+
+/// Whether no neighbour has a row's number; numbers do not fall.
+pub(crate) fn is_alone(numbers: &[i64], row: usize) -> bool {
+    let number = Some(&numbers[row]);
+    row.checked_sub(1).is_none_or(|before| numbers.get(before) != number) && numbers.get(row + 1) != number
+}
+
+/// How late each stamp is against the line through the rows around it that are alone of their ticks: one that
+/// came by itself is on no line. Through all of them where hardly any is alone.
+pub(crate) fn lateness(t_s: &[f64], numbers: &[i64], period_s: f64) -> Vec<f64> {
+    let rows = t_s.len();
+    // Sums of a window slide along; times over numbers stay small for precision.
+    let mut sums = Sums::default();
+    let (mut from, mut to) = (0, 0);
+    let point = |row: usize| (numbers[row] as f64, t_s[row] - period_s * numbers[row] as f64);
+    let most_are = (0..rows).filter(|row| is_alone(numbers, *row)).count() * 2 > rows;
+    let weight = |row: usize| if is_alone(numbers, row) || !most_are { 1.0 } else { 0.0 };
+    let late = |row: usize| {
+        while to < rows.min(row + LINE_ROWS + 1) {
+            sums.add(point(to), weight(to));
+            to += 1;
+        }
+        while from + LINE_ROWS < row {
+            sums.add(point(from), -weight(from));
+            from += 1;
+        }
+        let (number, rest_s) = point(row);
+        rest_s - sums.line_at(number)
+    };
+    (0..rows).map(late).collect()
+}
+
+/// The lateness of each tick's row, the nearest of several; 0 of the others, which came by themselves.
+pub(crate) fn lateness_of_ticks(numbers: &[i64], late_s: &[f64]) -> Vec<f64> {
+    let mut of_ticks_s = vec![0.0; late_s.len()];
+    let mut first = 0;
+    for of_tick in numbers.chunk_by(|number, next| number == next) {
+        let rows = first..first + of_tick.len();
+        first = rows.end;
+        if let Some(nearest) = rows.min_by(|a, b| late_s[*a].abs().total_cmp(&late_s[*b].abs())) {
+            of_ticks_s[nearest] = late_s[nearest];
+        }
+    }
+    of_ticks_s
+}
+
+/// Sums of a line through points.
+#[derive(Default)]
+struct Sums {
+    count: f64,
+    x: f64,
+    y: f64,
+    xx: f64,
+    xy: f64,
+}
+
+impl Sums {
+    fn add(&mut self, (x, y): (f64, f64), times: f64) {
+        self.count += times;
+        self.x += times * x;
+        self.y += times * y;
+        self.xx += times * x * x;
+        self.xy += times * x * y;
+    }
+
+    /// The line at a point; the mean where it has no slope.
+    fn line_at(&self, x: f64) -> f64 {
+        let (mean_x, mean_y) = (self.x / self.count, self.y / self.count);
+        let square = self.xx - self.count * mean_x * mean_x;
+        let slope = if square > 0.5 * self.count { (self.xy - self.count * mean_x * mean_y) / square } else { 0.0 };
+        mean_y + slope * (x - mean_x)
+    }
+}

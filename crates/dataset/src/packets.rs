@@ -1,0 +1,101 @@
+//! Rows that a controller keeps and sends some at a time: those of a packet are received in one moment,
+//! though they were read a sampling period after each other.
+//!
+//! All packets have as many rows but few. The last of a packet is held to be read when it is sent, on the
+//! beat of the packets.
+
+use crate::receipt_delays::rows_on_heels;
+use crate::sampling_period::SamplingPeriod;
+
+/// Share of the packets that have as many rows at the least; of rows that hold up each other by chance, bunches
+/// of one size are half at most.
+const MIN_USUAL_SHARE: f64 = 0.9;
+/// Rows of a packet at the least: two come on each other's heels where a motion ends.
+const MIN_ROWS: usize = 2;
+
+/// The beat of rows that come in packets, and when each was read; `None` where they do not.
+pub(crate) fn sampling_period(t_s: &[f64]) -> Option<SamplingPeriod> {
+    let (_, on_heels) = rows_on_heels(t_s)?;
+    let firsts: Vec<usize> = (0..t_s.len()).filter(|row| !on_heels[*row]).collect();
+    let ends = firsts[1..].iter().copied().chain([t_s.len()]);
+    let packets: Vec<(usize, usize)> = firsts.iter().copied().zip(ends).collect();
+    let usual = packets[packets.len() / 2];
+    let rows = usual.1 - usual.0;
+    // Of the first and the last the log may have a part.
+    let whole = packets.iter().filter(|(from, to)| to - from == rows).count();
+    let inner = packets.len().saturating_sub(2);
+    if rows < MIN_ROWS || (whole as f64) < MIN_USUAL_SHARE * inner as f64 {
+        return None;
+    }
+    let ends_s: Vec<f64> = packets.iter().map(|(_, to)| t_s[to - 1]).collect();
+    let of_packets = SamplingPeriod::of(&ends_s)?;
+    let period_s = of_packets.period_s / rows as f64;
+    let (mut numbers, mut late_s) = (Vec::with_capacity(t_s.len()), Vec::with_capacity(t_s.len()));
+    for (packet, (from, to)) in packets.iter().enumerate() {
+        let last = rows as i64 * of_packets.numbers[packet];
+        let sent_s = t_s[to - 1] - of_packets.late_s[packet];
+        for row in *from..*to {
+            let before = (to - 1 - row) as i64;
+            numbers.push(last - before);
+            late_s.push(t_s[row] - (sent_s - period_s * before as f64));
+        }
+    }
+    let first = numbers[0];
+    numbers.iter_mut().for_each(|number| *number -= first);
+    // A packet that is longer than usual reaches into the one before.
+    numbers.is_sorted().then(|| SamplingPeriod::received(period_s, numbers, late_s))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::draws::Draws;
+
+    const PERIOD_S: f64 = 0.01;
+
+    /// When rows are read, and when they are received that are sent by so many, and late by up to 2 ms.
+    fn sent_by(rows: i64) -> Vec<[f64; 2]> {
+        let mut draws = Draws(11);
+        let of_packet = |packet: i64| {
+            let sent_s = PERIOD_S * (rows * packet + rows - 1) as f64 + 2e-3 * draws.uniform();
+            (0..rows).map(move |row| [PERIOD_S * (rows * packet + row) as f64, sent_s + 1e-4 * (row - rows + 1) as f64])
+        };
+        (0..200).flat_map(of_packet).collect()
+    }
+
+    fn stamps_s(rows: &[[f64; 2]]) -> Vec<f64> {
+        rows.iter().map(|[_, stamp_s]| *stamp_s).collect()
+    }
+
+    #[test]
+    fn each_row_is_read_a_period_after_the_one_before() {
+        for rows in [2, 5, 10] {
+            let mut sent = sent_by(rows);
+            // The log begins within a packet, and a row of another is lost.
+            sent.drain(..1);
+            let lost = 20 * rows as usize - 1;
+            sent.remove(lost);
+            let found = sampling_period(&stamps_s(&sent)).expect("packets");
+            assert!((found.period_s / PERIOD_S - 1.0).abs() < 1e-3, "{} of {rows}", found.period_s);
+            let wrong = sent.iter().zip(&found.late_s).map(|([read_s, stamp_s], late_s)| stamp_s - late_s - read_s);
+            // Packets are late by 1 ms on average, which no beat tells; the row that is lost leaves others of
+            // its packet a row off.
+            let is_right = |wrong_s: f64| (wrong_s - 1e-3).abs() < 5e-4;
+            let right = wrong.filter(|wrong_s| is_right(*wrong_s)).count();
+            assert!(right + rows as usize >= sent.len(), "{right} of {} for {rows}", sent.len());
+            assert_eq!(found.numbers.last(), Some(&(200 * rows - 2)));
+        }
+    }
+
+    #[test]
+    fn rows_that_hold_up_each_other_by_chance_are_no_packets() {
+        let mut draws = Draws(12);
+        let mut before_s = 0.0_f64;
+        let received = |row: i32| {
+            before_s = (PERIOD_S * f64::from(row) - 0.02 * draws.uniform().ln()).max(before_s + 1e-4);
+            before_s
+        };
+        assert!(sampling_period(&(0..2000).map(received).collect::<Vec<f64>>()).is_none());
+        assert!(sampling_period(&(0..2000).map(|row| PERIOD_S * f64::from(row)).collect::<Vec<f64>>()).is_none());
+    }
+}
