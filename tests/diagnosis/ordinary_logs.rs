@@ -119,6 +119,58 @@ const KINDS: &[(&str, Change, &[&str])] = &[
     ("truth at 100 Hz of 0.2 mm", |of| (of.truth_hz, of.truth_sigma_m, of.truth_sigma_rad) = (100.0, 2e-4, 4e-4), &[]),
     ("truth of 2 cm and 20 mrad", |of| (of.truth_sigma_m, of.truth_sigma_rad) = (2e-2, 2e-2), &[]),
     (
+        "particle filter",
+        |of| {
+            (of.ticks_per_rev, of.odometry_hz, of.stamps) = (4096.0, 30.0, Stamps::Jitter(5e-3));
+            (of.truth_hz, of.truth_sigma_m, of.truth_sigma_rad, of.truth_tau_s) = (2.0, 2e-2, 1e-2, 2.0);
+            (of.latency_s, of.outliers) = (0.1, 0.01);
+        },
+        &["truth_latency", "truth_correlated_noise", "interval_error", "truth_outliers"],
+    ),
+    (
+        "camera and tags",
+        |of| {
+            (of.ticks_per_rev, of.odometry_hz) = (2048.0, 50.0);
+            (of.truth_hz, of.truth_sigma_m, of.truth_sigma_rad, of.truth_grows_per_m) = (20.0, 5e-3, 5e-3, 1.0);
+            (of.latency_s, of.outliers, of.lost_poses) = (0.04, 0.02, 0.3);
+            (of.truth_pause_s, of.wraps) = (Some([4.0, 6.0]), true);
+        },
+        &["truth_latency", "truth_outliers", "unlisted"],
+    ),
+    (
+        "vehicle and total station",
+        |of| {
+            (of.scale, of.ticks_per_rev, of.odometry_hz) = (3.0, 1000.0, 20.0);
+            (of.reports, of.truth_hz, of.truth_sigma_m, of.latency_s) = (Reports::Positions, 5.0, 2e-3, 0.08);
+        },
+        &["truth_latency"],
+    ),
+    (
+        "motion capture",
+        |of| {
+            (of.odometry_hz, of.ticks_per_rev) = (50.0, 2000.0);
+            (of.truth_hz, of.truth_sigma_m, of.truth_sigma_rad, of.latency_s) = (100.0, 2e-4, 4e-4, 0.008);
+        },
+        &["truth_latency"],
+    ),
+    (
+        "one long log of a particle filter",
+        |of| {
+            (of.ticks_per_rev, of.odometry_hz, of.stamps) = (4096.0, 30.0, Stamps::Received(8e-3));
+            (of.truth_hz, of.truth_sigma_m, of.truth_sigma_rad, of.truth_tau_s) = (4.0, 2e-2, 1e-2, 1.0);
+            (of.latency_s, of.joined, of.clock_gain) = (0.15, true, 2e-5);
+        },
+        &["truth_latency", "truth_correlated_noise", "interval_error"],
+    ),
+    (
+        "toy and camera",
+        |of| {
+            (of.scale, of.ticks_per_rev, of.odometry_hz, of.stamps) = (0.3, 360.0, 20.0, Stamps::RoundedTo(1e-3));
+            (of.truth_hz, of.truth_sigma_m, of.truth_sigma_rad, of.latency_s) = (30.0, 1e-3, 5e-3, 0.06);
+        },
+        &["truth_latency"],
+    ),
+    (
         "positions of 5 mm at 1 Hz",
         |of| (of.reports, of.truth_sigma_m, of.truth_hz) = (Reports::Positions, 5e-3, 1.0),
         &[],

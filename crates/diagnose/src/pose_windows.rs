@@ -216,13 +216,13 @@ impl<'t> CalibratedTracks<'t> {
         Vector3::new(cos * x_m - sin * y_m, sin * x_m + cos * y_m, wrap_to_pi(measured.theta_rad - predicted.theta_rad))
     }
 
-    /// The instrument's place on the robot in a track, with its covariance (x, y, heading), by the windows
-    /// that are taken. The wheels' scale is that of all tracks: on a circle a scale and a lever arm are one.
+    /// The instrument's place on the robot in a track, with standard deviations (x, y, heading), by the
+    /// windows that are taken. The wheels' scale is that of all tracks: on a circle a scale and a lever arm are one.
     pub(crate) fn extrinsics(
         &self,
         track: usize,
         is_taken: impl Fn((usize, usize)) -> bool,
-    ) -> Option<(Pose, Matrix3<f64>)> {
+    ) -> Option<(Pose, [f64; 3])> {
         let taken = windows(self.tracks[track].len(), self.span).filter(|window| is_taken(*window));
         let rows: Vec<ExtrinsicsRow> =
             extrinsics_rows(&self.tracks[track], &self.dead_reckoned[track], taken).collect();
@@ -265,6 +265,17 @@ struct ExtrinsicsRow {
     turn_rad: f64,
 }
 
+impl ExtrinsicsRow {
+    /// What the instrument saw, turned as it is on the robot, and the derivatives of what the wheels say by the
+    /// instrument's place and its heading.
+    fn linearized_at(&self, theta_rad: f64) -> (Vector2<f64>, [Vector3<f64>; 2]) {
+        let ((sin_of, cos_of), (sin, cos)) = (theta_rad.sin_cos(), self.turn_rad.sin_cos());
+        let m = self.measured;
+        let seen = Vector2::new(cos_of * m.x - sin_of * m.y, sin_of * m.x + cos_of * m.y);
+        (seen, [Vector3::new(1.0 - cos, sin, -seen.y), Vector3::new(-sin, 1.0 - cos, seen.x)])
+    }
+}
+
 fn extrinsics_rows<'t>(
     track: &'t PoseTrack,
     poses: &'t [Pose],
@@ -280,35 +291,47 @@ fn extrinsics_rows<'t>(
     })
 }
 
-/// The instrument's place on the robot by some windows, near the one that is stated, with its covariance
-/// (x, y, heading) by what is left of them. The wheels' scale is known.
-fn mounting(rows: &[ExtrinsicsRow], near: Pose) -> Option<(Pose, Matrix3<f64>)> {
+/// The instrument's place on the robot by some windows, near the one that is stated, with the standard
+/// deviations of x, y and heading by what is left of them. The wheels' scale is known.
+///
+/// On a circle any place on the same circle does, turned accordingly: along that bend the direction that is
+/// not determined changes, and is no axis' alone where the search ends. What is determined is so at its
+/// beginning, too.
+fn mounting(rows: &[ExtrinsicsRow], near: Pose) -> Option<(Pose, [f64; 3])> {
     let mut of = near;
-    let (mut information, mut squares) = (Matrix3::identity(), 0.0);
+    let mut weights = vec![0.0; rows.len()];
+    let mut squares = 0.0;
     for _ in 0..REWEIGHTINGS {
         // What the windows do not determine stays near: a metre and a radian are weak enough.
-        information = Matrix3::from_diagonal_element(1e-6);
+        let mut information = Matrix3::from_diagonal_element(1e-6);
         let mut score = -1e-6 * Vector3::new(of.x_m - near.x_m, of.y_m - near.y_m, of.theta_rad - near.theta_rad);
         squares = 0.0;
-        let (sin_of, cos_of) = of.theta_rad.sin_cos();
-        for row in rows {
-            let (m, (sin, cos)) = (row.measured, row.turn_rad.sin_cos());
-            let seen = Vector2::new(cos_of * m.x - sin_of * m.y, sin_of * m.x + cos_of * m.y);
-            let design = [Vector3::new(1.0 - cos, sin, -seen.y), Vector3::new(-sin, 1.0 - cos, seen.x)];
+        for (row, weight) in rows.iter().zip(&mut weights) {
+            let (seen, design) = row.linearized_at(of.theta_rad);
             let place = Vector3::new(of.x_m, of.y_m, 0.0);
             let left = row.dead_reckoned - seen - Vector2::new(design[0].dot(&place), design[1].dot(&place));
-            let weight = 1.0 / left.norm().max(1e-4);
-            squares += weight * left.norm_squared();
+            *weight = 1.0 / left.norm().max(1e-4);
+            squares += *weight * left.norm_squared();
             for (design, left) in design.into_iter().zip([left.x, left.y]) {
-                information += weight * design * design.transpose();
-                score += weight * design * left;
+                information += *weight * design * design.transpose();
+                score += *weight * design * left;
             }
         }
         let step = information.cholesky()?.solve(&score);
         of = Pose::new(of.x_m + step.x, of.y_m + step.y, of.theta_rad + step.z);
     }
     let variance = squares / (2 * rows.len()).saturating_sub(3).max(1) as f64;
-    Some((of, information.try_inverse()? * variance))
+    let variances_at = |pose: Pose| {
+        let mut information = Matrix3::from_diagonal_element(1e-6);
+        for (row, weight) in rows.iter().zip(&weights) {
+            let designs = row.linearized_at(pose.theta_rad).1;
+            information +=
+                designs.into_iter().map(|design| *weight * design * design.transpose()).sum::<Matrix3<f64>>();
+        }
+        Some(information.try_inverse()?.diagonal() * variance)
+    };
+    let (first, last) = (variances_at(near)?, variances_at(of)?);
+    Some((of, [0, 1, 2].map(|axis| first[axis].max(last[axis]).sqrt())))
 }
 
 /// g cos θ_s, g sin θ_s, ℓ_x, ℓ_y.

@@ -30,7 +30,7 @@ pub(super) fn other_extrinsics(
         let is_taken = |(from, to): (usize, usize)| {
             lasts || events[track].iter().all(|event| to <= event.poses.start || from >= event.poses.end - 1)
         };
-        let (pose, covariance) = calibrated.extrinsics(track, is_taken)?;
+        let (pose, sigmas) = calibrated.extrinsics(track, is_taken)?;
         if lasts && !limits.events(calibrated, track, pose).is_empty() {
             return None;
         }
@@ -41,7 +41,7 @@ pub(super) fn other_extrinsics(
             calibrated.extrinsics(track, is_of_half).map(|(pose, _)| pose)
         };
         let halves = [half(true)?, half(false)?];
-        Some((track, pose, halves, [0, 1, 2].map(|axis| covariance[(axis, axis)].sqrt())))
+        Some((track, pose, halves, sigmas))
     };
     let extrinsics: Vec<(usize, Pose, [Pose; 2], [f64; 3])> =
         (0..calibrated.tracks.len()).filter_map(of_track).collect();
