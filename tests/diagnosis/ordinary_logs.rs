@@ -407,3 +407,59 @@ fn what_the_encoders_do_not_resolve_is_said() {
         assert!(!is_unresolved("clock_rate") && !is_unresolved("truth_lever_arm"));
     }
 }
+
+#[test]
+fn zz_calibration() {
+    let kinds: Vec<_> = kinds()
+        .map(|(k, c, _)| (*k, *c))
+        .chain(FAULTS.iter().chain(&[]).map(|(k, c, _)| (*k, *c)))
+        .chain(UNLISTED.iter().map(|(k, c, _)| (*k, *c)))
+        .collect();
+    let (robots, first) = robots();
+    let of = std::env::var("YAIR_KIND").unwrap_or_default();
+    for (kind, change) in kinds.into_iter().filter(|(kind, _)| kind.contains(&of)) {
+        let zs: Vec<Option<[f64; 3]>> = (first..first + robots)
+            .into_par_iter()
+            .map(|seed| {
+                let mut robot = PlainRobot::ordinary(seed);
+                change(&mut robot);
+                let folder = tempfile::tempdir().expect("a temporary folder");
+                let truth = robot.write(folder.path());
+                if let Ok(keep) = std::env::var("YAIR_KEEP") {
+                    if !std::path::Path::new(&keep).exists() {
+                        robot.write(std::path::Path::new(&keep));
+                    }
+                }
+                let out = std::process::Command::new("target/release/yair")
+                    .args(["calibrate", "--json"])
+                    .arg(folder.path())
+                    .output()
+                    .expect("run");
+                let text = String::from_utf8_lossy(&out.stderr).into_owned();
+            for line in text.lines().filter(|line| line.contains("error") || line.contains("clock_drift")) { println!("SAID {kind} {seed}: {line}"); }
+            let json: serde_json::Value = serde_json::from_slice(&out.stdout).ok()?;
+                let text = json.to_string();
+                if std::env::var("YAIR_SHOW").is_ok() {
+                    println!("{text}");
+                }
+                let joint = json["methods"].as_array()?.iter().find(|m| m["method"] == "joint")?.clone();
+                let z = |name: &str, truth: f64| {
+                    let p = joint["parameters"][name].clone();
+                    Some((p["value"].as_f64()? - truth) / p["sigma"].as_f64()?)
+                };
+                Some([
+                    z("left_wheel_diameter_m", truth[0])?,
+                    z("right_wheel_diameter_m", truth[1])?,
+                    z("wheel_separation_m", truth[2])?,
+                ])
+            })
+            .collect();
+        let n = zs.iter().flatten().count();
+        let rms: Vec<String> = (0..3)
+            .map(|k| format!("{:.2}", (zs.iter().flatten().map(|z| z[k] * z[k]).sum::<f64>() / n as f64).sqrt()))
+            .collect();
+        let mean: Vec<String> =
+            (0..3).map(|k| format!("{:+.2}", zs.iter().flatten().map(|z| z[k]).sum::<f64>() / n as f64)).collect();
+        println!("CAL {kind}: {n} of {} rms {} mean {}", zs.len(), rms.join(" "), mean.join(" "));
+    }
+}

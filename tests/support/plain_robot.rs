@@ -191,8 +191,8 @@ impl PlainRobot {
         }
     }
 
-    /// Drives all runs and writes the dataset.
-    pub(crate) fn write(&self, folder: &Path) {
+    /// Drives all runs and writes the dataset; the diameters of the wheels, and their separation, metres.
+    pub(crate) fn write(&self, folder: &Path) -> [f64; 3] {
         fs::create_dir_all(folder).expect("a folder");
         let mut draws = Draws(self.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x5851_f42d_4c95_7f2d);
         let base_m = self.scale * 0.363 * (1.0 + 0.01 * draws.normal());
@@ -240,5 +240,6 @@ impl PlainRobot {
         fs::write(folder.join("dataset.toml"), text).expect("written");
         fs::write(folder.join("odometry.csv"), odometry).expect("written");
         fs::write(folder.join("truth.csv"), truth).expect("written");
+        [2.0 * radius_m[0], 2.0 * radius_m[1], base_m]
     }
 }

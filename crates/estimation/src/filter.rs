@@ -21,7 +21,7 @@ use crate::noise_score::{JointUpdate, NoiseScore, TimingScore};
 use crate::noise_shape::{CorrelatedErrors, Whitened};
 use crate::pass_options::{OutlierGate, PassOptions};
 use crate::products::{Products, Sums};
-use crate::propagation::{CarriedState, Moved, PropagationSource, Propagator, SegmentCache};
+use crate::propagation::{CarriedState, Moved, PropagationSource, Propagator, SegmentCache, turned_by};
 use crate::rounding::Rounding;
 use crate::segment::{MeasuredPose, Segment, Start};
 use crate::settings::{OUTLIER_CHI_SQUARE, RESTART_AFTER_OUTLIERS};
@@ -247,6 +247,8 @@ impl<'f, 'a> Filter<'f, 'a> {
         let [moved, by_latency] = self
             .twists_before(after, t_s, twist)
             .map(|Twist { v_m_s, omega_rad_s }| Vector3::new(cos * v_m_s, sin * v_m_s, omega_rad_s));
+        // The measured heading is that of the beginning of what was driven since.
+        let moved = turned_by(moved, 0.5 * late * moved.z);
         self.pose = Pose::new(
             measured.x_m - mounted.x + late * moved.x,
             measured.y_m - mounted.y + late * moved.y,
@@ -367,7 +369,9 @@ impl<'f, 'a> Filter<'f, 'a> {
         let sensor_velocity = |Twist { v_m_s, omega_rad_s }: Twist| {
             Vector3::new(cos * v_m_s - omega_rad_s * mounted.y, sin * v_m_s + omega_rad_s * mounted.x, omega_rad_s)
         };
-        let (moved, by_latency) = (sensor_velocity(twists[0]), sensor_velocity(twists[1]));
+        let turned_back_rad = late * twists[0].omega_rad_s;
+        let moved = turned_by(sensor_velocity(twists[0]), -0.5 * turned_back_rad);
+        let by_latency = turned_by(sensor_velocity(twists[1]), -turned_back_rad);
         let mut sum_of_terms = Vector3::zeros();
         for (number, size) in self.model.term_values.iter().enumerate().filter(|(_, size)| **size != 0.0) {
             sum_of_terms += *size * self.by_measurement.get(number);

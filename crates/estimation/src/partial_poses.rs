@@ -9,7 +9,7 @@ use crate::noise::{Noise, NoiseComponent};
 use crate::noise_shape::{CorrelatedErrors, NoiseShape};
 use crate::partial_observation::{Observation, Quantity};
 use crate::partial_records::PartialSegment;
-use crate::propagation::Propagator;
+use crate::propagation::{Propagator, turned_by};
 use crate::segment::{MeasuredPose, Segment};
 use crate::thinning::PropagationInterval;
 
@@ -121,6 +121,8 @@ impl PoseUpdate {
             Vector3::new(cos * ahead - turning * mounted.y, sin * ahead + turning * mounted.x, turning)
         };
         let (moved, by_latency) = (velocity(0.5 * latency_s), velocity(latency_s));
+        let turned_back_rad = latency_s * moved.z;
+        let (moved, by_latency) = (turned_by(moved, -0.5 * turned_back_rad), turned_by(by_latency, -turned_back_rad));
         let by_terms = instrument_by_terms((partial, place), pose, measured.t_s, propagator);
         let of_terms: Vector3<f64> = model.term_values.iter().zip(&by_terms).map(|(size, by)| *by * *size).sum();
         let ahead = mounted - moved * latency_s + of_terms;

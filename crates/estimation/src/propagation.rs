@@ -111,6 +111,17 @@ impl CachedPropagation {
     }
 }
 
+/// A velocity in the room, along the heading of another instant: the robot has turned by so much from now to
+/// then. The path of a delay is the chord of an arc, which has the heading of its middle.
+#[inline(always)]
+pub(crate) fn turned_by(velocity: Vector3<f64>, turn_rad: f64) -> Vector3<f64> {
+    if turn_rad == 0.0 {
+        return velocity;
+    }
+    let (sin, cos) = sin_cos(turn_rad);
+    Vector3::new(cos * velocity.x - sin * velocity.y, sin * velocity.x + cos * velocity.y, velocity.z)
+}
+
 /// State at the end of a displacement: the terms of the next one go on from it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct CarriedState {
@@ -399,7 +410,8 @@ impl<'f, 'a> Propagator<'f, 'a> {
         self.measurement(pose, 0, t_s, twist);
         let Pose { x_m, y_m, theta_rad } = self.sum_of_terms();
         let late = self.twist(self.segment.rate_at(after, t_s - 0.5 * latency_s));
-        Pose::new(x_m - late.v_m_s * latency_s, y_m, theta_rad - late.omega_rad_s * latency_s)
+        let back = Increment { distance_m: -late.v_m_s * latency_s, turn_rad: -late.omega_rad_s * latency_s }.arc();
+        Pose::new(x_m + back.x_m, y_m + back.y_m, theta_rad + back.theta_rad)
     }
 
     /// The sum of the terms' latest gradients, times their values.

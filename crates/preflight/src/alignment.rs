@@ -5,7 +5,9 @@ use rayon::prelude::*;
 
 use crate::regression::regress;
 use crate::run_log::RunLog;
-use crate::settings::{CLOCK_RATES, CLOCK_STEPS_S, MAX_CLOCK_OFFSET_S, MAX_NEAR_OFFSET_S, MIN_OVERLAP, MIN_WINDOWS};
+use crate::settings::{
+    CLOCK_RATES, CLOCK_STEPS_S, MAX_CLOCK_OFFSET_S, MAX_NEAR_OFFSET_S, MIN_OVERLAP, MIN_WINDOWS, SMALL_RATE_HALVINGS,
+};
 use crate::windows::{Measured, Window};
 
 /// A clock of the instrument: a stamp t is of the log's instant (t − offset)/(1 + rate).
@@ -200,19 +202,29 @@ impl Comparison<'_> {
             }
         };
         let count = (most / step).round() as i32;
-        let of_rate = |k: i32| {
-            let rate = step * f64::from(k);
+        let of_rate = |rate: f64| {
             [0.0, near.offset_s, near.offset_s - rate * middle_s].map(|offset_s| Clock { offset_s, rate })
         };
-        let grid: Vec<Clock> = (-count..=count).flat_map(of_rate).collect();
+        // In a long log, a small rate makes clocks as far apart as a large one in a short log.
+        let small = (1..=SMALL_RATE_HALVINGS).flat_map(|halvings| {
+            let rate = step * 0.5_f64.powi(halvings);
+            [-rate, rate]
+        });
+        let rates = (-count..=count).map(|k| step * f64::from(k)).chain(small);
+        let grid: Vec<Clock> = rates.flat_map(of_rate).collect();
         let all: Vec<_> = grid.into_par_iter().map(|clock| (clock, self.at(clock))).collect();
         all.into_iter().for_each(|(clock, found)| consider(clock, found, &mut best));
         let (mut step, mut step_s) = (0.5 * step, CLOCK_STEPS_S[1]);
-        for _ in 0..6 {
+        for _ in 0..9 {
             for _ in 0..2 {
                 for by in [-2.0, -1.0, 1.0, 2.0] {
                     let (at, _) = best?;
                     let beside = Clock { rate: at.rate + by * step, ..at };
+                    consider(beside, self.at(beside), &mut best);
+                    // About the middle, too: what a rate changes there an offset must not undo.
+                    let (at, _) = best?;
+                    let rate = at.rate + by * step;
+                    let beside = Clock { rate, offset_s: at.offset_s - by * step * middle_s };
                     consider(beside, self.at(beside), &mut best);
                     let beside = Clock { offset_s: at.offset_s + by * step_s, ..at };
                     consider(beside, self.at(beside), &mut best);

@@ -98,13 +98,17 @@ pub(crate) const MIN_OVERLAP: f64 = 0.5;
 /// Convention: quartz is good to 1e-4, a clock that counts ticks of another length is off by per cents.
 pub(crate) const CLOCK_RATES: [f64; 2] = [0.06, 0.0025];
 
+/// Number. How often the step of the rates is halved beside the clock that is.
+/// Derived: the least is 1.6e-4, half a second in an hour.
+pub(crate) const SMALL_RATE_HALVINGS: i32 = 4;
+
 /// Relative. Clock rate from which on it is said.
-/// Budgeted: over a run of a minute, less is a latency of a window.
-pub(crate) const MIN_CLOCK_RATE: f64 = 0.004;
+/// Budgeted: wheels at a steady speed are off by as much, and are known to a tenth of it at best.
+pub(crate) const MIN_CLOCK_RATE: f64 = 2e-4;
 
 /// Relative. Clock rate from which on no result is right.
-/// Budgeted: poses of a run of half a minute are then late by a window at its end.
-pub(crate) const MAX_CLOCK_RATE: f64 = 0.01;
+/// Budgeted: wheels at a steady speed are off by as much, ten times what calibrations promise.
+pub(crate) const MAX_CLOCK_RATE: f64 = 5e-4;
 
 /// Ratio to the stated value, or its inverse, that calibration corrects; beyond, the log says something else
 /// than it means.

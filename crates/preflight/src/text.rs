@@ -73,7 +73,7 @@ pub(crate) fn sentence(kind: &Kind, runs: Option<&[String]>) -> String {
         Kind::ClockRate { rate } => {
             let fast = if *rate > 0.0 { "fast" } else { "slow" };
             format!(
-                "truth's clock runs {:.1} % {fast} against the log's; multiply truth's times by {:.5}",
+                "truth's clock runs {:.2} % {fast} against the log's, and wheels come out as wrong; multiply truth's times by {:.5}",
                 100.0 * rate.abs(),
                 1.0 / (1.0 + rate)
             )
