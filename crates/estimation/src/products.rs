@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::layout::Layout;
 use crate::model::Column;
 use crate::normal_equations::NormalEquations;
-use crate::settings::MIN_VARIANCE_PRODUCT;
+use crate::settings::{MIN_VARIANCE_PRODUCT, START_HEADING_PRECISION};
 
 /// Which columns' products a normal equation has. Outer products grow with the square of the columns;
 /// candidates that are tested one by one need none with each other.
@@ -173,7 +173,7 @@ impl<'p> Sums<'p> {
         if !self.free || last[carried] <= 0.0 {
             return (equations, None);
         }
-        let (own, gradient) = (last[carried], self.gradient[carried]);
+        let (own, gradient) = (last[carried] + START_HEADING_PRECISION, self.gradient[carried]);
         let cross = of_equations(&last[..carried]);
         let by: Vec<f64> = cross.iter().map(|cross| -cross / own).collect();
         for (row, by) in by.iter().enumerate() {

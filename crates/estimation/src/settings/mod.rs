@@ -343,6 +343,11 @@ pub(crate) const STEP_INCREASE: f64 = 1.3;
 /// Tuned: by hand; no record of what on.
 pub(crate) const LEFT_BASIN_STEP: f64 = 100.0;
 
+/// Information on a start heading that is not measured beside what the run says, 1/rad².
+/// Derived: of positions that say as little, errors bend the likelihood by three times the root of the
+/// information I on average at the most, and a step by I + λ does not overshoot where λ is above 1.1.
+pub(crate) const START_HEADING_PRECISION: f64 = 2.0;
+
 /// Damping of a Gauss–Newton step, as a share of each direction's information.
 /// Budgeted: it keeps steps finite, slows them by 1e-7, and moves no minimum.
 pub(crate) const RELATIVE_DAMPING: f64 = 1e-7;
