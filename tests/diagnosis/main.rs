@@ -2,6 +2,7 @@
 //! tell names apart.
 
 mod blind_benchmark;
+mod calibrated_ordinary_logs;
 mod coarse_encoders;
 mod extended_model;
 mod hidden_effects;

@@ -33,12 +33,12 @@ fn shown(document: &Document) -> Vec<String> {
 }
 
 /// Robots of each kind, and the first seed.
-fn robots() -> (u64, u64) {
+pub(crate) fn robots() -> (u64, u64) {
     let number = |name: &str| std::env::var(name).ok().and_then(|text| text.parse().ok());
     (number("YAIR_ROBOTS").unwrap_or(1), number("YAIR_SEED").unwrap_or(500))
 }
 
-type Change = fn(&mut PlainRobot);
+pub(crate) type Change = fn(&mut PlainRobot);
 
 /// What is ordinary about a log, and what may be found in it because it is there.
 const KINDS: &[(&str, Change, &[&str])] = &[
@@ -173,7 +173,7 @@ const KINDS: &[(&str, Change, &[&str])] = &[
 ];
 
 /// Kinds whose name has the text of YAIR_KIND in it; all without.
-fn kinds() -> impl Iterator<Item = &'static (&'static str, Change, &'static [&'static str])> {
+pub(crate) fn kinds() -> impl Iterator<Item = &'static (&'static str, Change, &'static [&'static str])> {
     let of = std::env::var("YAIR_KIND").unwrap_or_default();
     KINDS.iter().filter(move |(name, ..)| name.contains(&of))
 }
@@ -407,59 +407,8 @@ fn what_the_encoders_do_not_resolve_is_said() {
         assert!(!is_unresolved("clock_rate") && !is_unresolved("truth_lever_arm"));
     }
 }
-
 #[test]
-fn zz_calibration() {
-    let kinds: Vec<_> = kinds()
-        .map(|(k, c, _)| (*k, *c))
-        .chain(FAULTS.iter().chain(&[]).map(|(k, c, _)| (*k, *c)))
-        .chain(UNLISTED.iter().map(|(k, c, _)| (*k, *c)))
-        .collect();
-    let (robots, first) = robots();
+fn zz_write() {
     let of = std::env::var("YAIR_KIND").unwrap_or_default();
-    for (kind, change) in kinds.into_iter().filter(|(kind, _)| kind.contains(&of)) {
-        let zs: Vec<Option<[f64; 3]>> = (first..first + robots)
-            .into_par_iter()
-            .map(|seed| {
-                let mut robot = PlainRobot::ordinary(seed);
-                change(&mut robot);
-                let folder = tempfile::tempdir().expect("a temporary folder");
-                let truth = robot.write(folder.path());
-                if let Ok(keep) = std::env::var("YAIR_KEEP") {
-                    if !std::path::Path::new(&keep).exists() {
-                        robot.write(std::path::Path::new(&keep));
-                    }
-                }
-                let out = std::process::Command::new("target/release/yair")
-                    .args(["calibrate", "--json"])
-                    .arg(folder.path())
-                    .output()
-                    .expect("run");
-                let text = String::from_utf8_lossy(&out.stderr).into_owned();
-            for line in text.lines().filter(|line| line.contains("error") || line.contains("clock_drift")) { println!("SAID {kind} {seed}: {line}"); }
-            let json: serde_json::Value = serde_json::from_slice(&out.stdout).ok()?;
-                let text = json.to_string();
-                if std::env::var("YAIR_SHOW").is_ok() {
-                    println!("{text}");
-                }
-                let joint = json["methods"].as_array()?.iter().find(|m| m["method"] == "joint")?.clone();
-                let z = |name: &str, truth: f64| {
-                    let p = joint["parameters"][name].clone();
-                    Some((p["value"].as_f64()? - truth) / p["sigma"].as_f64()?)
-                };
-                Some([
-                    z("left_wheel_diameter_m", truth[0])?,
-                    z("right_wheel_diameter_m", truth[1])?,
-                    z("wheel_separation_m", truth[2])?,
-                ])
-            })
-            .collect();
-        let n = zs.iter().flatten().count();
-        let rms: Vec<String> = (0..3)
-            .map(|k| format!("{:.2}", (zs.iter().flatten().map(|z| z[k] * z[k]).sum::<f64>() / n as f64).sqrt()))
-            .collect();
-        let mean: Vec<String> =
-            (0..3).map(|k| format!("{:+.2}", zs.iter().flatten().map(|z| z[k]).sum::<f64>() / n as f64)).collect();
-        println!("CAL {kind}: {n} of {} rms {} mean {}", zs.len(), rms.join(" "), mean.join(" "));
-    }
+    for (k, c, _) in kinds().filter(|(k, ..)| *k == of) { for seed in robots().1..robots().1+robots().0 { let mut r = PlainRobot::ordinary(seed); c(&mut r); r.write(std::path::Path::new(&format!("/tmp/w_{seed}"))); println!("{k}"); } }
 }

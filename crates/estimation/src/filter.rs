@@ -244,9 +244,8 @@ impl<'f, 'a> Filter<'f, 'a> {
         let theta_rad = measured.theta_rad - ltheta;
         let (sin, cos) = sin_cos(theta_rad);
         let mounted = Vector3::new(cos * lx - sin * ly, sin * lx + cos * ly, 0.0);
-        let [moved, by_latency] = self
-            .twists_before(after, t_s, twist)
-            .map(|Twist { v_m_s, omega_rad_s }| Vector3::new(cos * v_m_s, sin * v_m_s, omega_rad_s));
+        let velocity = |Twist { v_m_s, omega_rad_s }| Vector3::new(cos * v_m_s, sin * v_m_s, omega_rad_s);
+        let [moved, by_latency] = self.twists_before(after, t_s, twist).map(velocity);
         // The measured heading is that of the beginning of what was driven since.
         let moved = turned_by(moved, 0.5 * late * moved.z);
         self.pose = Pose::new(
@@ -263,7 +262,7 @@ impl<'f, 'a> Filter<'f, 'a> {
             self.by.set(Column::Latency.index(), by_latency);
         }
         self.measurement(propagations, (t_s, twist), sin_cos(self.pose.theta_rad));
-        // What went before the start is not since the measurement before the next one.
+        // What went before the start is not of the next one.
         let _ = self.propagator.sample(self.pose, (self.number, 0));
         for (number, size) in self.model.term_values.iter().enumerate() {
             let measurement = self.by_measurement.get(number);
@@ -286,8 +285,7 @@ impl<'f, 'a> Filter<'f, 'a> {
         self.rounding.start(self.instrument_variance(), interpolated_rad2, self.model);
     }
 
-    /// How the drive's centre moves while a measurement is late, and at the instant that it is of: the motion
-    /// in between is that of the middle.
+    /// How the drive's centre moves in the middle of a measurement's delay, and at the instant that it is of.
     #[inline(always)]
     fn twists_before(&self, after: usize, t_s: f64, twist: Twist) -> [Twist; 2] {
         let late_s = self.instrument.latency_s;

@@ -173,7 +173,10 @@ impl<'p> Sums<'p> {
         if !self.free || last[carried] <= 0.0 {
             return (equations, None);
         }
-        let (own, gradient) = (last[carried] + START_HEADING_PRECISION, self.gradient[carried]);
+        let (said, gradient) = (last[carried], self.gradient[carried]);
+        // A heading of which the run says hardly anything stays where it is: what errors alone bend would
+        // wander on for ever.
+        let own = (said + START_HEADING_PRECISION).powi(2) / said;
         let cross = of_equations(&last[..carried]);
         let by: Vec<f64> = cross.iter().map(|cross| -cross / own).collect();
         for (row, by) in by.iter().enumerate() {
@@ -183,7 +186,7 @@ impl<'p> Sums<'p> {
             }
         }
         equations.chi_square -= gradient * gradient / own;
-        equations.log_det += own.ln();
+        equations.log_det += (said + START_HEADING_PRECISION).ln();
         equations.count -= 1.0;
         (equations, Some(HeadingResponse { rest: -gradient / own, by, information: own }))
     }

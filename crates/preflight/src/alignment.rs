@@ -202,9 +202,8 @@ impl Comparison<'_> {
             }
         };
         let count = (most / step).round() as i32;
-        let of_rate = |rate: f64| {
-            [0.0, near.offset_s, near.offset_s - rate * middle_s].map(|offset_s| Clock { offset_s, rate })
-        };
+        let of_rate =
+            |rate: f64| [0.0, near.offset_s, near.offset_s - rate * middle_s].map(|offset_s| Clock { offset_s, rate });
         // In a long log, a small rate makes clocks as far apart as a large one in a short log.
         let small = (1..=SMALL_RATE_HALVINGS).flat_map(|halvings| {
             let rate = step * 0.5_f64.powi(halvings);

@@ -7,6 +7,7 @@
 mod map;
 mod partial;
 mod poses_between_rows;
+mod start_headings;
 mod thinning;
 
 pub(crate) use map::{
@@ -19,6 +20,7 @@ pub(crate) use partial::{
     WALL_START_DIRECTIONS, WALL_START_STEPS,
 };
 pub(crate) use poses_between_rows::{MAX_INTERPOLATED_VARIANCE_RATIO, MAX_SHARED_VARIANCE_RATIO, MIN_POSES_NEAR_ROWS};
+pub(crate) use start_headings::{HEADING_STEP_TOLERANCE_RAD, START_HEADING_BASELINE_M, START_HEADING_PRECISION};
 pub(crate) use thinning::{MIN_MEASUREMENTS_PER_RUN, SPACING_SLACK, THINNING_FACTOR, THINNING_PHASES};
 
 // Numbers of arithmetic.
@@ -107,10 +109,6 @@ pub(crate) const ROTATED_SENSOR_RAD: f64 = 0.2;
 /// Ratio of chord to distance below which a motion has no direction for the sensor's heading.
 /// Tuned: by hand; no record of what on.
 pub(crate) const MIN_CHORD_RATIO: f64 = 0.3;
-
-/// Distance from the start, metres, over which a start heading that is not measured is found.
-/// Derived: a centimetre of error over half a metre is a degree.
-pub(crate) const START_HEADING_BASELINE_M: f64 = 0.5;
 
 // Rates of the wheels.
 
@@ -295,10 +293,6 @@ pub(crate) const MEAN_COST_TOLERANCE: f64 = 1e-4;
 /// Budgeted: the log-likelihood changes by half of it, 0.005.
 pub(crate) const NOISE_COST_TOLERANCE: f64 = 1e-2;
 
-/// Step of a start heading, radians, below which it has converged.
-/// Budgeted: headings follow a step to first order, so that the square of it, 1e-12 rad, is left.
-pub(crate) const HEADING_STEP_TOLERANCE_RAD: f64 = 1e-6;
-
 /// Most steps of a fit.
 /// Tuned: by hand; no record of what on.
 pub(crate) const MAX_FIT_STEPS: usize = 60;
@@ -342,11 +336,6 @@ pub(crate) const STEP_INCREASE: f64 = 1.3;
 /// Squared step of the mean over its variance beyond which a fit has left its basin: ten standard deviations.
 /// Tuned: by hand; no record of what on.
 pub(crate) const LEFT_BASIN_STEP: f64 = 100.0;
-
-/// Information on a start heading that is not measured beside what the run says, 1/rad².
-/// Derived: of positions that say as little, errors bend the likelihood by three times the root of the
-/// information I on average at the most, and a step by I + λ does not overshoot where λ is above 1.1.
-pub(crate) const START_HEADING_PRECISION: f64 = 2.0;
 
 /// Damping of a Gauss–Newton step, as a share of each direction's information.
 /// Budgeted: it keeps steps finite, slows them by 1e-7, and moves no minimum.

@@ -1,0 +1,117 @@
+//! Calibration of logs that this project's simulator did not drive ([`crate::plain_robot`]), of the same kinds as
+//! [`crate::ordinary_logs`]: lengths within their standard deviations, or a refusal where they would be wrong.
+//!
+//! The campaign: `YAIR_ROBOTS=40 cargo test --release --test diagnosis calibrated -- --nocapture`.
+#![allow(clippy::print_stdout)] // every kind with its errors
+
+use std::path::Path;
+use std::process::Command;
+
+use rayon::prelude::*;
+use serde_json::Value;
+
+use crate::ordinary_logs::{Change, kinds, robots};
+use crate::plain_robot::PlainRobot;
+
+/// Both wheels' diameters and their separation.
+const LENGTHS: [&str; 3] = ["left_wheel_diameter_m", "right_wheel_diameter_m", "wheel_separation_m"];
+
+/// What `calibrate` says.
+struct Calibrated {
+    is_refused: bool,
+    said: String,
+    /// Errors of what is determined, over their standard deviations.
+    z: Vec<f64>,
+}
+
+fn calibrated(folder: &Path, truth_m: [f64; 3]) -> Calibrated {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_yair"));
+    let output = command.args(["calibrate", "--json"]).arg(folder).output().expect("it runs");
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    if !output.status.success() {
+        return Calibrated { is_refused: true, said, z: Vec::new() };
+    }
+    let document: Value = serde_json::from_slice(&output.stdout).expect("a document");
+    let methods = document["methods"].as_array().expect("methods");
+    let joint = methods.iter().find(|of| of["method"] == "joint").expect("joint");
+    let z = LENGTHS.iter().zip(truth_m).filter_map(|(length, truth_m)| {
+        let of = &joint["parameters"][length];
+        Some((of["value"].as_f64()? - truth_m) / of["sigma"].as_f64()?)
+    });
+    Calibrated { is_refused: false, said, z: z.collect() }
+}
+
+fn of_robot(change: Change, seed: u64) -> Calibrated {
+    let mut robot = PlainRobot::ordinary(seed);
+    change(&mut robot);
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let truth_m = robot.write(folder.path());
+    calibrated(folder.path(), truth_m)
+}
+
+/// Kinds of which standard deviations are known to be too small, with the root mean square of z that was
+/// measured with 60 robots: two measurements a run, rows that hold up each other, and one log whose instrument
+/// errs alike for seconds.
+const TOO_CERTAIN: &[&str] =
+    &["ends of runs", "received 5 ms late", "camera and tags", "one long log of a particle filter"];
+
+#[test]
+fn lengths_of_ordinary_logs_are_within_their_standard_deviations() {
+    let (robots, first) = robots();
+    // The mean of one robot's errors says nothing of a bias.
+    let robots = robots.max(2);
+    let cases: Vec<(&str, Change, u64)> = kinds()
+        .filter(|(kind, ..)| !TOO_CERTAIN.contains(kind))
+        .flat_map(|(kind, change, _)| (first..first + robots).map(move |seed| (*kind, *change, seed)))
+        .collect();
+    let found: Vec<(&str, Calibrated)> =
+        cases.into_par_iter().map(|(kind, change, seed)| (kind, of_robot(change, seed))).collect();
+    let (mut complaints, mut squares) = (Vec::new(), Vec::new());
+    for of_kind in found.chunk_by(|a, b| a.0 == b.0) {
+        let kind = of_kind[0].0;
+        complaints.extend(of_kind.iter().filter(|(_, of)| of.is_refused).map(|(_, of)| format!("{kind}: {}", of.said)));
+        let z: Vec<f64> = of_kind.iter().flat_map(|(_, of)| of.z.iter().copied()).collect();
+        let mean = z.iter().sum::<f64>() / z.len() as f64;
+        let square = z.iter().map(|z| z * z).sum::<f64>() / z.len() as f64;
+        println!("{kind}: RMS z {:.2}, mean {mean:+.2}, of {}", square.sqrt(), z.len());
+        // Lengths of a robot share their errors: the mean of all of two has a standard deviation of 0.7 at
+        // the most. Beyond 4.5 of it one of 70 kinds has a chance of 5e-4.
+        if mean.abs() > 4.5 * (0.5 * robots as f64).sqrt().recip() * 0.71 {
+            complaints.push(format!("{kind}: mean z {mean:+.2}"));
+        }
+        squares.push(square);
+    }
+    let rms = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+    println!("RMS z of all kinds {rms:.2}");
+    // Of 60 kinds the root mean square has a standard deviation of a twentieth, and standard deviations that
+    // are known to a tenth are customary.
+    assert!(complaints.is_empty() && (0.8..1.25).contains(&rms), "{rms} {complaints:#?}");
+}
+
+/// A clock that runs at another rate makes wheels of another size where the robot drives steadily.
+#[test]
+fn a_clock_of_another_rate_is_refused_with_what_mends_it() {
+    for (change, factor) in [
+        ((|of| (of.clock_gain, of.joined) = (1e-3, true)) as Change, 1.001),
+        (|of| (of.clock_gain, of.joined) = (-4e-3, true), 0.996),
+        (|of| (of.clock_gain, of.truth_sigma_m, of.truth_sigma_rad) = (4e-3, 3e-4, 5e-4), 1.004),
+    ] {
+        let mut robot = PlainRobot::ordinary(600);
+        change(&mut robot);
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let truth_m = robot.write(folder.path());
+        let found = calibrated(folder.path(), truth_m);
+        assert!(found.is_refused && found.said.contains("clock_drift"), "{}", found.said);
+        // As it says, to five digits.
+        let mends = found.said.split("truth_time_factor = ").nth(1).expect("what mends it");
+        let mends: f64 = mends.split(' ').next().and_then(|text| text.parse().ok()).expect("a factor");
+        assert!((mends - factor).abs() < 3e-5, "{mends} for {factor}");
+        let manifest = folder.path().join("dataset.toml");
+        let text = std::fs::read_to_string(&manifest).expect("a manifest");
+        let corrected = format!("[corrections]\ntruth_time_factor = {mends:?}\n[robot]");
+        std::fs::write(&manifest, text.replace("[robot]", &corrected)).expect("written");
+        let found = calibrated(folder.path(), truth_m);
+        // The factor is known to some 1e-5, a seventh of what wheels are.
+        assert!(!found.is_refused && found.z.iter().all(|z| z.abs() < 4.5), "{:?} {}", found.z, found.said);
+    }
+}
