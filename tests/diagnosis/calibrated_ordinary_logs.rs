@@ -1,5 +1,6 @@
-//! Calibration of logs that this project's simulator did not drive ([`crate::plain_robot`]), of the same kinds as
-//! [`crate::ordinary_logs`]: lengths within their standard deviations, or a refusal where they would be wrong.
+//! Calibration of logs that this project's simulator did not drive ([`crate::plain_robot`]), of the same
+//! kinds as [`crate::ordinary_logs`]: lengths within their standard deviations, or a refusal where they would
+//! be wrong.
 //!
 //! The campaign: `YAIR_ROBOTS=40 cargo test --release --test diagnosis calibrated -- --nocapture`.
 #![allow(clippy::print_stdout)] // every kind with its errors
@@ -50,8 +51,8 @@ fn of_robot(change: Change, seed: u64) -> Calibrated {
 }
 
 /// Kinds of which standard deviations are known to be too small, with the root mean square of z that was
-/// measured with 60 robots: two measurements a run, rows that hold up each other, and one log whose instrument
-/// errs alike for seconds.
+/// measured with 60 robots: two measurements a run, rows that hold up each other, and one log whose
+/// instrument errs alike for seconds.
 const TOO_CERTAIN: &[&str] =
     &["ends of runs", "received 5 ms late", "camera and tags", "one long log of a particle filter"];
 

@@ -239,7 +239,6 @@ const FAULTS: &[(&str, Change, &str)] = &[
         |of| (of.clock_gain, of.clock_runs_on) = (1e-3, true),
         "clock_rate",
     ),
-    ("play of 2 mm", |of| of.gap_m = 2e-3, "backlash"),
     ("play of 2 mm, positions", |of| (of.gap_m, of.reports) = (2e-3, Reports::Positions), "backlash"),
     ("slip with speed", |of| of.slip_s_m = 0.02, "slip_speed"),
     ("slip with speed, one long log", |of| (of.slip_s_m, of.joined) = (0.02, true), "slip_speed"),
@@ -277,6 +276,8 @@ fn what_is_wrong_is_named_and_nothing_else() {
 
 /// What is wrong that no name of the catalogue is, and the names that are right all the same.
 const UNLISTED: &[(&str, Change, &[&str])] = &[
+    // Where in its gap a wheel is when a run begins nobody knows: some begin with a jump of a millimetre.
+    ("play of 2 mm", |of| of.gap_m = 2e-3, &["backlash"]),
     // A delay in the mean, that is less where the robot speeds up.
     ("truth filtered over 0.1 s", |of| of.truth_filter_s = 0.1, &["truth_latency"]),
     ("a slippery patch", |of| of.slippery_band = Some([0.0, 0.6]), &["robot_displaced", "truth_jump"]),
@@ -406,9 +407,4 @@ fn what_the_encoders_do_not_resolve_is_said() {
         assert_eq!(is_unresolved("low_speed_truncation"), is_coarse, "{:?}", shown(&document));
         assert!(!is_unresolved("clock_rate") && !is_unresolved("truth_lever_arm"));
     }
-}
-#[test]
-fn zz_write() {
-    let of = std::env::var("YAIR_KIND").unwrap_or_default();
-    for (k, c, _) in kinds().filter(|(k, ..)| *k == of) { for seed in robots().1..robots().1+robots().0 { let mut r = PlainRobot::ordinary(seed); c(&mut r); r.write(std::path::Path::new(&format!("/tmp/w_{seed}"))); println!("{k}"); } }
 }

@@ -4,52 +4,72 @@
 //! All packets have as many rows but few. The last of a packet is held to be read when it is sent, on the
 //! beat of the packets.
 
-use crate::receipt_delays::rows_on_heels;
-use crate::sampling_period::SamplingPeriod;
+use std::ops::Range;
 
-/// Share of the packets that have as many rows at the least; of rows that hold up each other by chance, bunches
-/// of one size are half at most.
+use crate::receipt_delays::rows_on_heels;
+
+/// Share of the packets that have as many rows at the least; of rows that hold up each other by chance,
+/// bunches of one size are half at most.
 const MIN_USUAL_SHARE: f64 = 0.9;
 /// Rows of a packet at the least: two come on each other's heels where a motion ends.
 const MIN_ROWS: usize = 2;
 
-/// The beat of rows that come in packets, and when each was read; `None` where they do not.
-pub(crate) fn sampling_period(t_s: &[f64]) -> Option<SamplingPeriod> {
-    let (_, on_heels) = rows_on_heels(t_s)?;
-    let firsts: Vec<usize> = (0..t_s.len()).filter(|row| !on_heels[*row]).collect();
-    let ends = firsts[1..].iter().copied().chain([t_s.len()]);
-    let packets: Vec<(usize, usize)> = firsts.iter().copied().zip(ends).collect();
-    let usual = packets[packets.len() / 2];
-    let rows = usual.1 - usual.0;
-    // Of the first and the last the log may have a part.
-    let whole = packets.iter().filter(|(from, to)| to - from == rows).count();
-    let inner = packets.len().saturating_sub(2);
-    if rows < MIN_ROWS || (whole as f64) < MIN_USUAL_SHARE * inner as f64 {
-        return None;
+/// The rows of each packet.
+pub(crate) struct Packets {
+    of: Vec<Range<usize>>,
+    /// How many rows they usually have.
+    rows: usize,
+}
+
+/// A beat, and for each of its stamps the number of its tick and how late it is, seconds.
+pub(crate) struct PeriodicTimes {
+    pub(crate) period_s: f64,
+    pub(crate) numbers: Vec<i64>,
+    pub(crate) late_s: Vec<f64>,
+}
+
+impl Packets {
+    /// By stamps that do not fall; `None` where rows do not come in packets.
+    pub(crate) fn of(t_s: &[f64]) -> Option<Self> {
+        let (_, on_heels) = rows_on_heels(t_s)?;
+        let firsts: Vec<usize> = (0..t_s.len()).filter(|row| !on_heels[*row]).collect();
+        let ends = firsts[1..].iter().copied().chain([t_s.len()]);
+        let of: Vec<Range<usize>> = firsts.iter().copied().zip(ends).map(|(from, to)| from..to).collect();
+        let rows = of[of.len() / 2].len();
+        // Of the first and the last the log may have a part.
+        let whole = of.iter().filter(|packet| packet.len() == rows).count();
+        let inner = of.len().saturating_sub(2);
+        (rows >= MIN_ROWS && whole as f64 >= MIN_USUAL_SHARE * inner as f64).then_some(Self { of, rows })
     }
-    let ends_s: Vec<f64> = packets.iter().map(|(_, to)| t_s[to - 1]).collect();
-    let of_packets = SamplingPeriod::of(&ends_s)?;
-    let period_s = of_packets.period_s / rows as f64;
-    let (mut numbers, mut late_s) = (Vec::with_capacity(t_s.len()), Vec::with_capacity(t_s.len()));
-    for (packet, (from, to)) in packets.iter().enumerate() {
-        let last = rows as i64 * of_packets.numbers[packet];
-        let sent_s = t_s[to - 1] - of_packets.late_s[packet];
-        for row in *from..*to {
-            let before = (to - 1 - row) as i64;
-            numbers.push(last - before);
-            late_s.push(t_s[row] - (sent_s - period_s * before as f64));
+
+    /// When each was sent: the stamps of the last rows.
+    pub(crate) fn sent_s(&self, t_s: &[f64]) -> Vec<f64> {
+        self.of.iter().map(|packet| t_s[packet.end - 1]).collect()
+    }
+
+    /// The beat of the rows by that of the packets; `None` where a packet is longer than usual and reaches
+    /// into the one before.
+    pub(crate) fn of_rows(&self, t_s: &[f64], sent: &PeriodicTimes) -> Option<PeriodicTimes> {
+        let period_s = sent.period_s / self.rows as f64;
+        let (mut numbers, mut late_s) = (Vec::with_capacity(t_s.len()), Vec::with_capacity(t_s.len()));
+        for (packet, (number, sent_late_s)) in self.of.iter().zip(sent.numbers.iter().zip(&sent.late_s)) {
+            let sent_s = t_s[packet.end - 1] - sent_late_s;
+            for (before, stamp_s) in (0..packet.len() as i64).rev().zip(&t_s[packet.clone()]) {
+                numbers.push(self.rows as i64 * number - before);
+                late_s.push(stamp_s - (sent_s - period_s * before as f64));
+            }
         }
+        let first = numbers[0];
+        numbers.iter_mut().for_each(|number| *number -= first);
+        numbers.is_sorted().then_some(PeriodicTimes { period_s, numbers, late_s })
     }
-    let first = numbers[0];
-    numbers.iter_mut().for_each(|number| *number -= first);
-    // A packet that is longer than usual reaches into the one before.
-    numbers.is_sorted().then(|| SamplingPeriod::received(period_s, numbers, late_s))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::draws::Draws;
+    use crate::sampling_period::SamplingPeriod;
 
     const PERIOD_S: f64 = 0.01;
 
@@ -75,7 +95,7 @@ mod tests {
             sent.drain(..1);
             let lost = 20 * rows as usize - 1;
             sent.remove(lost);
-            let found = sampling_period(&stamps_s(&sent)).expect("packets");
+            let found = SamplingPeriod::of(&stamps_s(&sent)).expect("packets");
             assert!((found.period_s / PERIOD_S - 1.0).abs() < 1e-3, "{} of {rows}", found.period_s);
             let wrong = sent.iter().zip(&found.late_s).map(|([read_s, stamp_s], late_s)| stamp_s - late_s - read_s);
             // Packets are late by 1 ms on average, which no beat tells; the row that is lost leaves others of
@@ -95,7 +115,7 @@ mod tests {
             before_s = (PERIOD_S * f64::from(row) - 0.02 * draws.uniform().ln()).max(before_s + 1e-4);
             before_s
         };
-        assert!(sampling_period(&(0..2000).map(received).collect::<Vec<f64>>()).is_none());
-        assert!(sampling_period(&(0..2000).map(|row| PERIOD_S * f64::from(row)).collect::<Vec<f64>>()).is_none());
+        assert!(Packets::of(&(0..2000).map(received).collect::<Vec<f64>>()).is_none());
+        assert!(Packets::of(&(0..2000).map(|row| PERIOD_S * f64::from(row)).collect::<Vec<f64>>()).is_none());
     }
 }

@@ -9,7 +9,7 @@
 
 use crate::lateness::{LINE_ROWS, is_alone, lateness, lateness_of_ticks};
 use crate::median::median;
-use crate::packets;
+use crate::packets::{Packets, PeriodicTimes};
 use crate::receipt_delays::Received;
 use crate::row_numbers::likeliest_numbers;
 
@@ -70,8 +70,8 @@ impl SamplingPeriod {
         if t_s.len() < MIN_ROWS {
             return None;
         }
-        if let Some(of_packets) = packets::sampling_period(t_s) {
-            return Some(of_packets);
+        if let Some(PeriodicTimes { period_s, numbers, late_s }) = Self::of_packets(t_s) {
+            return Some(Self::received(period_s, numbers, late_s));
         }
         if let Some(received) = Received::of(t_s) {
             let late_s: Vec<f64> = t_s.iter().zip(&received.read_s).map(|(t_s, read_s)| t_s - read_s).collect();
@@ -108,6 +108,13 @@ impl SamplingPeriod {
         let of_ticks_s = lateness_of_ticks(&numbers, &late_s);
         let late_s = if root_mean_square(&of_ticks_s) < MAX_JITTER_BESIDE * period_s { of_ticks_s } else { late_s };
         Some(Self { period_s, numbers, late_s, is_bunched: false, off_s })
+    }
+
+    /// The beat of rows that are sent some at a time.
+    fn of_packets(t_s: &[f64]) -> Option<PeriodicTimes> {
+        let packets = Packets::of(t_s)?;
+        let Self { period_s, numbers, late_s, .. } = Self::of(&packets.sent_s(t_s))?;
+        packets.of_rows(t_s, &PeriodicTimes { period_s, numbers, late_s })
     }
 
     /// Of rows that hold up each other, with what each is late by.

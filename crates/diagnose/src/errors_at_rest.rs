@@ -9,7 +9,7 @@
 
 use std::ops::Range;
 
-use dataset::{Dataset, RunView};
+use dataset::{Dataset, RunView, TruthSample};
 use estimation::WheelAngleInterpolator;
 use kinematics::wrap_to_pi;
 
@@ -28,7 +28,7 @@ pub(crate) fn are_white_at_rest(datasets: &[Dataset], coefficient: f64) -> Optio
                 let truth = &run.run().truth[poses];
                 standstills[0].push(truth.iter().map(|sample| sample.x_m).collect());
                 standstills[1].push(truth.iter().map(|sample| sample.y_m).collect());
-                let headings: Option<Vec<f64>> = truth.iter().map(|sample| sample.theta_rad()).collect();
+                let headings: Option<Vec<f64>> = truth.iter().map(TruthSample::theta_rad).collect();
                 let from = |headings: Vec<f64>| headings.iter().map(|rad| wrap_to_pi(rad - headings[0])).collect();
                 standstills[2].extend(headings.map(from));
             }
@@ -62,8 +62,8 @@ fn standstills_of(run: &RunView<'_>, track: &WheelAngleInterpolator<'_>) -> Vec<
     found
 }
 
-/// Negative log likelihood of errors of this lag-one coefficient about a mean of each standstill; `None` where
-/// there are none.
+/// Negative log likelihood of errors of this lag-one coefficient about a mean of each standstill; `None`
+/// where there are none.
 fn cost(standstills: &[Vec<f64>], coefficient: f64) -> Option<f64> {
     let keeps = (1.0 - coefficient * coefficient).sqrt();
     let (mut squares, mut freedom, mut logs) = (0.0, 0.0, 0.0);

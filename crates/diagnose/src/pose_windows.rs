@@ -217,7 +217,8 @@ impl<'t> CalibratedTracks<'t> {
     }
 
     /// The instrument's place on the robot in a track, with standard deviations (x, y, heading), by the
-    /// windows that are taken. The wheels' scale is that of all tracks: on a circle a scale and a lever arm are one.
+    /// windows that are taken. The wheels' scale is that of all tracks: on a circle a scale and a lever arm
+    /// are one.
     pub(crate) fn extrinsics(
         &self,
         track: usize,
@@ -266,8 +267,8 @@ struct ExtrinsicsRow {
 }
 
 impl ExtrinsicsRow {
-    /// What the instrument saw, turned as it is on the robot, and the derivatives of what the wheels say by the
-    /// instrument's place and its heading.
+    /// What the instrument saw, turned as it is on the robot, and the derivatives of what the wheels say by
+    /// the instrument's place and its heading.
     fn linearized_at(&self, theta_rad: f64) -> (Vector2<f64>, [Vector3<f64>; 2]) {
         let ((sin_of, cos_of), (sin, cos)) = (theta_rad.sin_cos(), self.turn_rad.sin_cos());
         let m = self.measured;

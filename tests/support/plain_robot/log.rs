@@ -155,9 +155,7 @@ impl PlainRobot {
         let mut state = path.samples[0].at;
         let share = if self.truth_filter_s > 0.0 { 1.0 - (-1e-3 / self.truth_filter_s).exp() } else { 1.0 };
         let of = |sample: &Sample| {
-            for axis in 0..3 {
-                state[axis] += share * (sample.at[axis] - state[axis]);
-            }
+            state.iter_mut().zip(sample.at).for_each(|(state, at)| *state += share * (at - *state));
             state
         };
         path.samples.iter().map(of).collect()
