@@ -165,6 +165,36 @@ const KINDS: &[(&str, Change, &[&str])] = &[
         },
         &["truth_latency"],
     ),
+    ("a toy", |of| of.scale = 0.2, &[]),
+    ("a vehicle", |of| of.scale = 3.0, &[]),
+    (
+        "a vehicle, 500 ticks, poses of 1 cm",
+        |of| (of.scale, of.ticks_per_rev, of.truth_sigma_m, of.truth_sigma_rad) = (3.0, 500.0, 1e-2, 5e-3),
+        &[],
+    ),
+    ("slow", |of| of.pace = 0.3, &[]),
+    ("slow, 500 ticks", |of| (of.pace, of.ticks_per_rev) = (0.3, 500.0), &[]),
+    ("fast", |of| of.pace = 3.0, &[]),
+    ("brisk", |of| of.briskness = 4.0, &[]),
+    ("brisk, counts at 10 Hz", |of| (of.briskness, of.odometry_hz) = (4.0, 10.0), &[]),
+    ("gentle", |of| of.briskness = 0.25, &[]),
+    ("no rests", |of| of.never_rests = true, &[]),
+    ("straights", |of| of.only = Some("straight"), &[]),
+    ("squares", |of| of.only = Some("square"), &[]),
+    ("squares one way", |of| of.only = Some("square_ccw"), &[]),
+    ("circles", |of| of.only = Some("circle"), &[]),
+    ("circles one way", |of| of.only = Some("circle_ccw"), &[]),
+    ("free", |of| of.only = Some("free"), &[]),
+    ("free, one long log", |of| (of.only, of.joined) = (Some("free"), true), &[]),
+    (
+        "free without rests, 500 ticks at 20 Hz, poses of 1 cm",
+        |of| {
+            (of.only, of.joined, of.never_rests) = (Some("free"), true, true);
+            (of.ticks_per_rev, of.odometry_hz) = (500.0, 20.0);
+            (of.truth_sigma_m, of.truth_sigma_rad) = (1e-2, 1e-2);
+        },
+        &[],
+    ),
     (
         "positions of 5 mm at 1 Hz",
         |of| (of.reports, of.truth_sigma_m, of.truth_hz) = (Reports::Positions, 5e-3, 1.0),

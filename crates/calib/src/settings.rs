@@ -255,6 +255,10 @@ pub(crate) const DELTA_TOLERANCE: f64 = 0.1;
 /// Budgeted: 160 MB.
 pub(crate) const MAX_PAIRS: usize = 10_000_000;
 
+/// Relative. Standard deviation of stated lengths.
+/// Convention: wheels and their separation are measured to a per cent.
+pub(crate) const STATED_LENGTH_SIGMA: f64 = 0.01;
+
 /// Length of the part of an unobservable direction along the separation, or the wheels' ratio, above which it
 /// is named after that.
 /// Convention: within 26° of it.

@@ -21,7 +21,7 @@ use motion_programs::Schedule;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::dead_reckoning_jacobian::unobservable;
-use crate::settings::{MIN_COMMON_SCALE_COMPONENT, MIN_NAMED_COMPONENT};
+use crate::settings::{MIN_COMMON_SCALE_COMPONENT, MIN_NAMED_COMPONENT, STATED_LENGTH_SIGMA};
 use crate::estimate::{
     CalibError, Calibration, Covariance, Extrinsics, GroupInstrument, Method, NotObservable, OdometryNoise, Parameter,
     Rejected,
@@ -61,6 +61,10 @@ impl Joint {
         Ok(Calibration { one_step: Some(one_step), ..calibration(&fit, robot.ticks_per_rev, &names)? })
     }
 }
+
+/// Why wheels and their separation are not determined where any of them makes up for the others.
+const BENDS_ALIKE: &str =
+    "the runs bend alike, so that wheels and separation make up for each other: add straights, and turns both ways";
 
 /// Why large datasets are not calibrated.
 #[derive(Debug, thiserror::Error)]
@@ -118,7 +122,7 @@ pub fn calibrated_drive(
         covariance: covariance
             .map(|covariance| geometry_covariance(|row, column| covariance[(row, column)], geometry_m)),
         noise: Some(noise(fit)),
-        not_observable: not_observable(fit),
+        not_observable: not_observable(fit, covariance),
         runs_used: fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).count(),
         converged: fit.solution.converged,
         ..Calibration::new(Joint::NAME, geometry, ticks_per_rev)
@@ -156,22 +160,30 @@ fn noise(fit: &ModelFit<'_>) -> OdometryNoise {
     }
 }
 
-/// What the measurements do not determine of the geometry.
-fn not_observable(fit: &ModelFit<'_>) -> Vec<NotObservable> {
-    fit.unobservable
-        .iter()
-        .flat_map(|direction| {
-            let direction = Vector3::new(direction[0], direction[1], direction[2]);
-            let (parameter, why) = unobservable(&direction);
-            let why = why_not(fit, &direction).unwrap_or(why);
-            // Both wheels alike, or against each other: neither diameter is known.
-            let of = direction.normalize().abs();
-            let wheels = [Parameter::LeftWheelDiameter, Parameter::RightWheelDiameter];
-            let both = wheels.contains(&parameter) && of.x.min(of.y) > MIN_COMMON_SCALE_COMPONENT;
-            let named = if both { wheels.to_vec() } else { vec![parameter] };
-            named.into_iter().map(move |parameter| NotObservable { parameter, why })
-        })
-        .collect()
+/// What the measurements do not determine of the geometry: of each direction the parameter that it is mostly
+/// of, and those that change by more than their standard deviation where that one is off by as much as stated
+/// lengths are.
+fn not_observable(fit: &ModelFit<'_>, covariance: Option<&Covariance>) -> Vec<NotObservable> {
+    let of_direction = |direction: &[f64; 3]| {
+        let direction = Vector3::new(direction[0], direction[1], direction[2]);
+        let (parameter, why) = unobservable(&direction);
+        let why = why_not(fit, &direction).unwrap_or(why);
+        // Both wheels alike, or against each other: neither diameter is known.
+        let of = direction.normalize().abs();
+        let wheels = [Parameter::LeftWheelDiameter, Parameter::RightWheelDiameter];
+        let both = wheels.contains(&parameter) && of.x.min(of.y) > MIN_COMMON_SCALE_COMPONENT;
+        let named = if both { wheels.to_vec() } else { vec![parameter] };
+        let moves = |(index, other): (usize, Parameter)| {
+            let moved = STATED_LENGTH_SIGMA * of[index] / of.max();
+            let sigma = covariance?[(index, index)].max(0.0).sqrt();
+            (moved > sigma && !named.contains(&other)).then_some(other)
+        };
+        let geometry = [Parameter::LeftWheelDiameter, Parameter::RightWheelDiameter, Parameter::WheelSeparation];
+        let others: Vec<Parameter> = geometry.into_iter().enumerate().filter_map(moves).collect();
+        let why = if others.is_empty() { why } else { BENDS_ALIKE };
+        named.into_iter().chain(others).map(move |parameter| NotObservable { parameter, why }).collect::<Vec<_>>()
+    };
+    fit.unobservable.iter().flat_map(|direction| of_direction(&[direction[0], direction[1], direction[2]])).collect()
 }
 
 /// Why a direction is not observable where partial measurements are all there is.
