@@ -161,8 +161,8 @@ fn noise(fit: &ModelFit<'_>) -> OdometryNoise {
 }
 
 /// What the measurements do not determine of the geometry: of each direction the parameter that it is mostly
-/// of, and those that change by more than their standard deviation where that one is off by as much as stated
-/// lengths are.
+/// of, and wheels that change by more than their standard deviation where a separation that is not determined
+/// is off by as much as stated lengths are.
 fn not_observable(fit: &ModelFit<'_>, covariance: Option<&Covariance>) -> Vec<NotObservable> {
     let of_direction = |direction: &[f64; 3]| {
         let direction = Vector3::new(direction[0], direction[1], direction[2]);
@@ -173,13 +173,13 @@ fn not_observable(fit: &ModelFit<'_>, covariance: Option<&Covariance>) -> Vec<No
         let wheels = [Parameter::LeftWheelDiameter, Parameter::RightWheelDiameter];
         let both = wheels.contains(&parameter) && of.x.min(of.y) > MIN_COMMON_SCALE_COMPONENT;
         let named = if both { wheels.to_vec() } else { vec![parameter] };
-        let moves = |(index, other): (usize, Parameter)| {
-            let moved = STATED_LENGTH_SIGMA * of[index] / of.max();
-            let sigma = covariance?[(index, index)].max(0.0).sqrt();
-            (moved > sigma && !named.contains(&other)).then_some(other)
+        let moves = |(index, wheel): (usize, Parameter)| {
+            let moved = STATED_LENGTH_SIGMA * of[index] / of.z;
+            (moved > covariance?[(index, index)].max(0.0).sqrt()).then_some(wheel)
         };
-        let geometry = [Parameter::LeftWheelDiameter, Parameter::RightWheelDiameter, Parameter::WheelSeparation];
-        let others: Vec<Parameter> = geometry.into_iter().enumerate().filter_map(moves).collect();
+        let of_separation = parameter == Parameter::WheelSeparation;
+        let others: Vec<Parameter> =
+            wheels.into_iter().enumerate().filter_map(moves).filter(|_| of_separation).collect();
         let why = if others.is_empty() { why } else { BENDS_ALIKE };
         named.into_iter().chain(others).map(move |parameter| NotObservable { parameter, why }).collect::<Vec<_>>()
     };
