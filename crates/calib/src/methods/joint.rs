@@ -175,7 +175,9 @@ fn not_observable(fit: &ModelFit<'_>, covariance: Option<&Covariance>) -> Vec<No
         let named = if both { wheels.to_vec() } else { vec![parameter] };
         let moves = |(index, wheel): (usize, Parameter)| {
             let moved = STATED_LENGTH_SIGMA * of[index] / of.z;
-            (moved > covariance?[(index, index)].max(0.0).sqrt()).then_some(wheel)
+            let variance = covariance?[(index, index)];
+            // What has no variance is not determined already.
+            (variance > 0.0 && moved * moved > variance).then_some(wheel)
         };
         let of_separation = parameter == Parameter::WheelSeparation;
         let others: Vec<Parameter> =
