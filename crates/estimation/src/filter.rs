@@ -205,7 +205,7 @@ impl<'f, 'a> Filter<'f, 'a> {
         let free = measured.theta_rad.is_none();
         self.start(pose, (xy, if free { 0.0 } else { theta }), next_piece, (propagations, measured.t_s));
         if let Some(shape) = &measured.shape {
-            let lever = if free { Vector3::zeros() } else { self.lever(&measured) };
+            let lever = if free { Vector3::zeros() } else { self.lever(measured.x_m, measured.y_m) };
             let [whole, position, heading] = shape.at_start(self.instrument_variance(), lever);
             self.covariance = Covariance::of([&(whole + self.of_start_instant())]);
             self.covariance_by = Covariances::of([&Matrix3::zeros(), &Matrix3::zeros(), &position, &heading]);
@@ -214,7 +214,7 @@ impl<'f, 'a> Filter<'f, 'a> {
             // The instrument's heading is the parameter, the drive's centre follows it round the instrument.
             self.sums.free = true;
             let last = self.direct.len() - 1;
-            self.by.set(last, self.lever(&measured));
+            self.by.set(last, self.lever(measured.x_m, measured.y_m));
         }
     }
 
@@ -224,10 +224,10 @@ impl<'f, 'a> Filter<'f, 'a> {
         self.start_velocity * self.start_velocity.transpose() * self.noise.timing_s2
     }
 
-    /// How the pose moves as the heading of the measurement that it starts at turns.
+    /// How the drive's centre moves round the instrument at this place as its measured heading turns.
     #[inline(always)]
-    fn lever(&self, measured: &MeasuredPose) -> Vector3<f64> {
-        Vector3::new(-(self.pose.y_m - measured.y_m), self.pose.x_m - measured.x_m, 1.0)
+    fn lever(&self, x_m: f64, y_m: f64) -> Vector3<f64> {
+        Vector3::new(-(self.pose.y_m - y_m), self.pose.x_m - x_m, 1.0)
     }
 
     #[inline(always)]
@@ -247,7 +247,8 @@ impl<'f, 'a> Filter<'f, 'a> {
         let velocity = |Twist { v_m_s, omega_rad_s }| Vector3::new(cos * v_m_s, sin * v_m_s, omega_rad_s);
         let [moved, by_latency] = self.twists_before(after, t_s, twist).map(velocity);
         // The measured heading is that of the beginning of what was driven since.
-        let moved = turned_by(moved, 0.5 * late * moved.z);
+        let turned_rad = late * moved.z;
+        let (moved, by_latency) = (turned_by(moved, 0.5 * turned_rad), turned_by(by_latency, turned_rad));
         self.pose = Pose::new(
             measured.x_m - mounted.x + late * moved.x,
             measured.y_m - mounted.y + late * moved.y,
@@ -273,8 +274,7 @@ impl<'f, 'a> Filter<'f, 'a> {
                 self.pose.theta_rad - size * measurement.z,
             );
         }
-        // The instrument's heading error moves the drive's centre round the instrument.
-        let lever = Vector3::new(-(self.pose.y_m - measured.y_m), self.pose.x_m - measured.x_m, 1.0);
+        let lever = self.lever(measured.x_m, measured.y_m);
         let position = Matrix3::from_diagonal(&Vector3::new(var_xy, var_xy, 0.0));
         let heading = lever * lever.transpose() * var_theta;
         self.covariance = Covariance::of([&(position + heading + self.of_start_instant())]);
