@@ -32,6 +32,17 @@ fn shown(document: &Document) -> Vec<String> {
     found.chain(failed.map(|check| format!("check {} p {:.1e}", check.name, check.p_value))).collect()
 }
 
+/// Prints what was found in a log and whether that is right, and says it of a log that is not.
+fn complaint_of(log: &str, is_right: bool, shown: &[String]) -> Option<String> {
+    println!("{} {log}: {}", if is_right { "right" } else { "WRONG" }, shown.join("; "));
+    (!is_right).then(|| log.to_owned())
+}
+
+/// What is shown of a diagnosis, or why there is none.
+fn shown_or_error(found: &Result<Document, String>) -> Vec<String> {
+    found.as_ref().map_or_else(|error| vec![error.clone()], shown)
+}
+
 /// Robots of each kind, and the first seed.
 pub(crate) fn robots() -> (u64, u64) {
     let number = |name: &str| std::env::var(name).ok().and_then(|text| text.parse().ok());
@@ -230,9 +241,8 @@ fn nothing_is_found_where_nothing_is_wrong() {
         let is_wrong = found.as_ref().map_or(true, |document| {
             document.findings.iter().any(|finding| !exempt.contains(&finding.names[0].as_str()))
         });
-        let shown = found.as_ref().map_or_else(|error| vec![error.clone()], shown);
-        println!("{} {kind}, seed {seed}: {}", if is_wrong { "WRONG" } else { "right" }, shown.join("; "));
-        (with_findings, all) = (with_findings + u64::from(is_wrong), all + 1);
+        let complaint = complaint_of(&format!("{kind}, seed {seed}"), !is_wrong, &shown_or_error(&found));
+        (with_findings, all) = (with_findings + u64::from(complaint.is_some()), all + 1);
     }
     println!("{with_findings} of {all} nulls have a wrong finding");
     // At 5 % family-wise, more than this many have a chance below 1e-3. Rejects rates from single rows: all
@@ -295,11 +305,7 @@ fn what_is_wrong_is_named_and_nothing_else() {
             matches!(&document.findings[..], [finding] if finding.names[0] == *id
                 && finding.runs.is_some() == fault.contains("one run"))
         });
-        let shown = found.as_ref().map_or_else(|error| vec![error.clone()], shown);
-        println!("{} {fault}, seed {seed}: {}", if is_right { "right" } else { "WRONG" }, shown.join("; "));
-        if !is_right {
-            complaints.push(format!("{fault}, seed {seed}"));
-        }
+        complaints.extend(complaint_of(&format!("{fault}, seed {seed}"), is_right, &shown_or_error(&found)));
     }
     assert!(complaints.is_empty(), "{complaints:#?}");
 }
@@ -337,11 +343,7 @@ fn what_has_no_name_gets_none_without_doubt() {
             };
             !document.findings.is_empty() && document.findings.iter().all(is_right)
         });
-        let shown = found.as_ref().map_or_else(|error| vec![error.clone()], shown);
-        println!("{} {what}, seed {seed}: {}", if is_right { "right" } else { "WRONG" }, shown.join("; "));
-        if !is_right {
-            complaints.push(format!("{what}, seed {seed}"));
-        }
+        complaints.extend(complaint_of(&format!("{what}, seed {seed}"), is_right, &shown_or_error(&found)));
     }
     println!("{} are wrong", complaints.len());
     // A campaign prints its share; one robot of each is right.
@@ -410,13 +412,9 @@ fn what_happens_in_single_runs_is_named_with_them_and_nothing_else_is_found() {
                 let is_of_runs = |finding: &Finding| finding.runs.is_some() && ids.contains(&finding.names[0].as_str());
                 !document.findings.is_empty() && document.findings.iter().all(is_of_runs)
             });
-            let shown = found.as_ref().map_or_else(
-                |error| vec![error.clone()],
-                |document| [shown(document), document.findings.iter().map(|of| of.sentence.clone()).collect()].concat(),
-            );
-            let verdict = if is_right { "right" } else { "WRONG" };
-            println!("{verdict} {event}; {log}, seed {seed}: {}", shown.join("; "));
-            (!is_right).then(|| format!("{event}; {log}, seed {seed}"))
+            let sentences = found.iter().flat_map(|document| &document.findings).map(|of| of.sentence.clone());
+            let shown: Vec<String> = shown_or_error(&found).into_iter().chain(sentences).collect();
+            complaint_of(&format!("{event}; {log}, seed {seed}"), is_right, &shown)
         })
         .collect();
     println!("{} are wrong", wrong.len());

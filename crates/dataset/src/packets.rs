@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use crate::receipt_delays::rows_on_heels;
+use crate::receipt_delays::{Received, rows_on_heels};
 
 /// Share of the packets that have as many rows at the least; of rows that hold up each other by chance,
 /// bunches of one size are half at most.
@@ -19,13 +19,6 @@ pub(crate) struct Packets {
     of: Vec<Range<usize>>,
     /// How many rows they usually have.
     rows: usize,
-}
-
-/// A beat, and for each of its stamps the number of its tick and how late it is, seconds.
-pub(crate) struct PeriodicTimes {
-    pub(crate) period_s: f64,
-    pub(crate) numbers: Vec<i64>,
-    pub(crate) late_s: Vec<f64>,
 }
 
 impl Packets {
@@ -47,21 +40,16 @@ impl Packets {
         self.of.iter().map(|packet| t_s[packet.end - 1]).collect()
     }
 
-    /// The beat of the rows by that of the packets; `None` where a packet is longer than usual and reaches
-    /// into the one before.
-    pub(crate) fn of_rows(&self, t_s: &[f64], sent: &PeriodicTimes) -> Option<PeriodicTimes> {
-        let period_s = sent.period_s / self.rows as f64;
-        let (mut numbers, mut late_s) = (Vec::with_capacity(t_s.len()), Vec::with_capacity(t_s.len()));
-        for (packet, (number, sent_late_s)) in self.of.iter().zip(sent.numbers.iter().zip(&sent.late_s)) {
-            let sent_s = t_s[packet.end - 1] - sent_late_s;
-            for (before, stamp_s) in (0..packet.len() as i64).rev().zip(&t_s[packet.clone()]) {
-                numbers.push(self.rows as i64 * number - before);
-                late_s.push(stamp_s - (sent_s - period_s * before as f64));
-            }
-        }
-        let first = numbers[0];
-        numbers.iter_mut().for_each(|number| *number -= first);
-        numbers.is_sorted().then_some(PeriodicTimes { period_s, numbers, late_s })
+    /// When the rows were read, by the packets' period and what each of them is late by; `None` where one is
+    /// longer than usual and reaches into the one before.
+    pub(crate) fn rows_read(&self, t_s: &[f64], (sent_period_s, sent_late_s): (f64, &[f64])) -> Option<Received> {
+        let period_s = sent_period_s / self.rows as f64;
+        let of_packet = |(packet, late_s): (&Range<usize>, &f64)| {
+            let sent_s = t_s[packet.end - 1] - late_s;
+            (0..packet.len()).rev().map(move |before| sent_s - period_s * before as f64)
+        };
+        let read_s: Vec<f64> = self.of.iter().zip(sent_late_s).flat_map(of_packet).collect();
+        read_s.is_sorted().then_some(Received { period_s, read_s })
     }
 }
 

@@ -9,7 +9,7 @@
 
 use crate::lateness::{LINE_ROWS, is_alone, lateness, lateness_of_ticks};
 use crate::median::median;
-use crate::packets::{Packets, PeriodicTimes};
+use crate::packets::Packets;
 use crate::receipt_delays::Received;
 use crate::row_numbers::likeliest_numbers;
 
@@ -70,12 +70,10 @@ impl SamplingPeriod {
         if t_s.len() < MIN_ROWS {
             return None;
         }
-        if let Some(PeriodicTimes { period_s, numbers, late_s }) = Self::of_packets(t_s) {
-            return Some(Self::received(period_s, numbers, late_s));
-        }
-        if let Some(received) = Received::of(t_s) {
+        if let Some(received) = Self::of_packets(t_s).or_else(|| Received::of(t_s)) {
             let late_s: Vec<f64> = t_s.iter().zip(&received.read_s).map(|(t_s, read_s)| t_s - read_s).collect();
-            return Some(Self::received(received.period_s, received.numbers(), late_s));
+            let (period_s, numbers, off_s) = (received.period_s, received.numbers(), root_mean_square(&late_s));
+            return Some(Self { period_s, numbers, late_s, is_bunched: true, off_s });
         }
         let gap_s = median(t_s.windows(2).map(|pair| pair[1] - pair[0]).collect())?;
         // The middle gap is exact where stamps are.
@@ -110,17 +108,11 @@ impl SamplingPeriod {
         Some(Self { period_s, numbers, late_s, is_bunched: false, off_s })
     }
 
-    /// The beat of rows that are sent some at a time.
-    fn of_packets(t_s: &[f64]) -> Option<PeriodicTimes> {
+    /// When rows were read that are sent some at a time.
+    fn of_packets(t_s: &[f64]) -> Option<Received> {
         let packets = Packets::of(t_s)?;
-        let Self { period_s, numbers, late_s, .. } = Self::of(&packets.sent_s(t_s))?;
-        packets.of_rows(t_s, &PeriodicTimes { period_s, numbers, late_s })
-    }
-
-    /// Of rows that hold up each other, with what each is late by.
-    pub(crate) fn received(period_s: f64, numbers: Vec<i64>, late_s: Vec<f64>) -> Self {
-        let off_s = root_mean_square(&late_s);
-        Self { period_s, numbers, late_s, is_bunched: true, off_s }
+        let sent = Self::of(&packets.sent_s(t_s))?;
+        packets.rows_read(t_s, (sent.period_s, &sent.late_s))
     }
 
     /// Whether stamps are near enough to the beat that the numbers of all rows are right.

@@ -132,16 +132,15 @@ impl World {
                     [now[0] - 0.5 * base_m * now[1], now[0] + 0.5 * base_m * now[1]].map(|v| v * ripple * DT_S);
                 // What was commanded is turned by the wheel; what it rolls differs by noise and eccentricity.
                 let mut rolled_m = [0.0; 2];
-                let slips = robot.slippery_band.filter(|[from_m, to_m]| (*from_m..*to_m).contains(&self.at[0]));
+                let slips = robot.slippery_band.is_some_and(|[from_m, to_m]| (from_m..to_m).contains(&self.at[0]));
                 for wheel in 0..2 {
                     let turned_rad = contact_m[wheel] / radius_m[wheel];
                     let middle_rad = self.wheels_rad[wheel] + 0.5 * turned_rad;
                     let wobble = if wheel == 1 { robot.eccentricity * (middle_rad + phase_rad).cos() } else { 0.0 };
-                    let slip = robot.slip_s_m * contact_m[wheel].abs() / DT_S + slips.map_or(0.0, |_| 0.03);
+                    let slip = robot.slip_s_m * contact_m[wheel].abs() / DT_S + if slips { 0.03 } else { 0.0 };
                     let noise_m = robot.wheel_sigma_m_per_sqrt_m * contact_m[wheel].abs().sqrt() * draws.normal();
                     // The wheel hangs back in its gap.
-                    let turned_m = turned_rad * radius_m[wheel];
-                    self.ahead_m[wheel] += turned_m;
+                    self.ahead_m[wheel] += contact_m[wheel];
                     let gap_m = 0.5 * robot.gap_m;
                     let over_m = self.ahead_m[wheel] - self.ahead_m[wheel].clamp(-gap_m, gap_m);
                     self.ahead_m[wheel] -= over_m;

@@ -12,6 +12,11 @@ impl PlainRobot {
         self.events.iter().filter(move |(run, _)| *run == number).map(|(_, event)| *event)
     }
 
+    /// The millisecond at which the log begins.
+    const fn first_step(&self) -> usize {
+        if self.starts_moving { 1500 } else { 0 }
+    }
+
     /// What the instrument sees of the robot.
     fn seen(&self, number: usize, t_s: f64, at: [f64; 3], jumped_at: &mut [f64; 3]) -> [f64; 3] {
         let mut seen = at;
@@ -69,9 +74,8 @@ impl PlainRobot {
         let every = (1000.0 / self.odometry_hz).round() as usize;
         let offset = [draws.uniform(), draws.uniform()];
         let counted_rad = self.counted_rad(path, draws);
-        let first = if self.starts_moving { 1500 } else { 0 };
         let (mut last_s, mut last_counts) = (f64::NEG_INFINITY, None);
-        for (row, step) in (first..path.samples.len()).step_by(every).enumerate() {
+        for (row, step) in (self.first_step()..path.samples.len()).step_by(every).enumerate() {
             let is_lost = draws.uniform() < self.lost_rows;
             // Rows that are sent together have the stamp of the last of them.
             let waits_for = self.rows_per_packet - 1 - row % self.rows_per_packet;
@@ -107,10 +111,13 @@ impl PlainRobot {
         let between = (self.truth_between_rows * 1000.0 / self.odometry_hz).round() as usize;
         let rows = (1000.0 / self.odometry_hz).round() as usize;
         let last = path.samples.len() - 1;
-        let first = if self.starts_moving { 1500 } else { 0 };
         let steps: Vec<usize> = match self.reports {
             Reports::FirstAndLast => vec![0, last / rows * rows],
-            _ => (first..path.samples.len()).step_by(every).map(|step| step + between).filter(|s| *s <= last).collect(),
+            _ => (self.first_step()..path.samples.len())
+                .step_by(every)
+                .map(|step| step + between)
+                .filter(|s| *s <= last)
+                .collect(),
         };
         let off_s = self.latency_s + self.late_run.filter(|(run, _)| *run == number).map_or(0.0, |(_, off_s)| off_s);
         let filtered = self.filtered(path);

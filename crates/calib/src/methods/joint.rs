@@ -164,28 +164,32 @@ fn noise(fit: &ModelFit<'_>) -> OdometryNoise {
 /// of, and wheels that change by more than their standard deviation where a separation that is not determined
 /// is off by as much as stated lengths are.
 fn not_observable(fit: &ModelFit<'_>, covariance: Option<&Covariance>) -> Vec<NotObservable> {
-    let of_direction = |direction: &[f64; 3]| {
-        let direction = Vector3::new(direction[0], direction[1], direction[2]);
-        let (parameter, why) = unobservable(&direction);
-        let why = why_not(fit, &direction).unwrap_or(why);
-        // Both wheels alike, or against each other: neither diameter is known.
-        let of = direction.normalize().abs();
-        let wheels = [Parameter::LeftWheelDiameter, Parameter::RightWheelDiameter];
-        let both = wheels.contains(&parameter) && of.x.min(of.y) > MIN_COMMON_SCALE_COMPONENT;
-        let named = if both { wheels.to_vec() } else { vec![parameter] };
-        let moves = |(index, wheel): (usize, Parameter)| {
-            let moved = STATED_LENGTH_SIGMA * of[index] / of.z;
-            let variance = covariance?[(index, index)];
+    fit.unobservable
+        .iter()
+        .flat_map(|direction| {
+            let direction = Vector3::new(direction[0], direction[1], direction[2]);
+            let (parameter, why) = unobservable(&direction);
+            let why = why_not(fit, &direction).unwrap_or(why);
+            let of = direction.normalize().abs();
+            let wheels = [Parameter::LeftWheelDiameter, Parameter::RightWheelDiameter];
             // What has no variance is not determined already.
-            (variance > 0.0 && moved * moved > variance).then_some(wheel)
-        };
-        let of_separation = parameter == Parameter::WheelSeparation;
-        let others: Vec<Parameter> =
-            wheels.into_iter().enumerate().filter_map(moves).filter(|_| of_separation).collect();
-        let why = if others.is_empty() { why } else { BENDS_ALIKE };
-        named.into_iter().chain(others).map(move |parameter| NotObservable { parameter, why }).collect::<Vec<_>>()
-    };
-    fit.unobservable.iter().flat_map(|direction| of_direction(&[direction[0], direction[1], direction[2]])).collect()
+            let moves = |wheel: usize| {
+                let variance = covariance.map_or(0.0, |covariance| covariance[(wheel, wheel)]);
+                variance > 0.0 && (STATED_LENGTH_SIGMA * of[wheel] / of.z).powi(2) > variance
+            };
+            let (named, why) = if parameter == Parameter::WheelSeparation {
+                let moved: Vec<Parameter> = (0..2).filter(|wheel| moves(*wheel)).map(|wheel| wheels[wheel]).collect();
+                let why = if moved.is_empty() { why } else { BENDS_ALIKE };
+                ([vec![parameter], moved].concat(), why)
+            } else if wheels.contains(&parameter) && of.x.min(of.y) > MIN_COMMON_SCALE_COMPONENT {
+                // Both wheels alike, or against each other: neither diameter is known.
+                (wheels.to_vec(), why)
+            } else {
+                (vec![parameter], why)
+            };
+            named.into_iter().map(move |parameter| NotObservable { parameter, why })
+        })
+        .collect()
 }
 
 /// Why a direction is not observable where partial measurements are all there is.
