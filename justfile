@@ -40,7 +40,7 @@ doc:
 documents:
     .ci/run documents
 
-# The blind benchmark of diagnosis against its bars; docs/diagnose.md has its table. It takes a quarter of an hour
+# The blind benchmark of diagnosis against its bars; docs/diagnosis-benchmark.md has its table. It takes a quarter of an hour
 challenge:
     .ci/run challenge
 

@@ -71,7 +71,8 @@ const DEFAULT_CASES: u64 = 200;
 /// Cases of the stored baseline.
 const CHECKED_CASES: u64 = 440;
 
-/// What a case takes on a core, in the optimised build: 2400 cases took 35 minutes (docs/diagnose.md).
+/// What a case takes on a core at the most, in the optimised build: 2400 cases took 13 min 27 s on two cores
+/// (docs/performance.md), three quarters of this.
 const SECONDS_A_CASE: f64 = 0.9;
 
 /// A week of computing; a typing error beyond.

@@ -1,9 +1,9 @@
 //! The blind benchmark of diagnosis, a small part of it with a fixed seed, and the same floors under a fresh
 //! one.
 //!
-//! The whole campaign is `just challenge`; docs/diagnose.md has its table. Here stand floors under what that
-//! measures, so far below it that only a tool that has broken falls through: one that alarms at nulls one
-//! time in two, finds half of what is plain, or names one in four of what it finds.
+//! The whole campaign is `just challenge`; docs/diagnosis-benchmark.md has its table. Here stand floors under
+//! what that measures, so far below it that only a tool that has broken falls through: one that alarms at
+//! nulls one time in two, finds half of what is plain, or names one in four of what it finds.
 #![allow(clippy::print_stdout)] // the seed, and what came of it
 
 use crate::support::{document, succeed, usage};
@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use statrs::distribution::{Binomial, DiscreteCDF};
 
 /// What the tool must do at the least, as shares: the bar on false positives under white noise, and floors
-/// under detection and naming, which docs/diagnose.md measures at 0.9 and 0.8.
+/// under detection and naming, which docs/diagnosis-benchmark.md measures at 0.9 each.
 const ALARMS: f64 = 0.05;
 const DETECTED: f64 = 0.7;
 const NAMED: f64 = 0.55;
@@ -80,7 +80,7 @@ fn a_fixed_part_of_the_challenge_is_passed() {
     let seed = 20_260;
     let cases = driven(seed, (0..40).filter(|number| number % 20 < NULLS_AND_SINGLES || [14, 16].contains(number)));
     let in_case_kind = |case_kind: CaseKind| cases.iter().filter(|case| case.case_kind == case_kind).count();
-    // No robot may show an effect that was drawn for it: docs/diagnose.md has such cases, a few in a hundred.
+    // No robot may show an effect that was drawn for it, in a few cases in a hundred.
     assert!(
         in_case_kind(CaseKind::Null) == 14 && (11..=14).contains(&in_case_kind(CaseKind::Single)),
         "{}",

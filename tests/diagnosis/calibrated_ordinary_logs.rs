@@ -50,9 +50,9 @@ fn of_robot(change: Change, seed: u64) -> Calibrated {
     calibrated(folder.path(), truth_m)
 }
 
-/// Kinds of which standard deviations are known to be too small (docs/diagnose.md has by how much): two
-/// measurements a run, rows that hold up each other, an instrument whose errors grow with distance and lose a
-/// third of its poses, and one log whose instrument errs alike for seconds.
+/// Kinds of which standard deviations are known to be too small (docs/diagnosis-benchmark.md has by how
+/// much): two measurements a run, rows that hold up each other, an instrument whose errors grow with distance
+/// and lose a third of its poses, and one log whose instrument errs alike for seconds.
 const TOO_CERTAIN: &[&str] =
     &["ends of runs", "received 5 ms late", "camera and tags", "one long log of a particle filter"];
 

@@ -35,7 +35,7 @@ speed, yaw rate and acceleration of the drive's centre, v_w, a_w those of a whee
 paths: what tells two apart is the path.
 
 *Meaning* is how a report tells of the effect, here with its sizes large. *Large* is what a real robot may have: detection limits and plans are judged by it. What is driven excites
-an effect unless it says otherwise under *Excited by*. *On board* is what a robot's own program can do of it ([export.md](export.md#on-board)). *Benchmark* is how the blind benchmark ([diagnose.md](diagnose.md)) hides it in a robot: in multiples of a large size, or at a
+an effect unless it says otherwise under *Excited by*. *On board* is what a robot's own program can do of it ([export.md](export.md#on-board)). *Benchmark* is how the blind benchmark ([diagnosis-benchmark.md](diagnosis-benchmark.md)) hides it in a robot: in multiples of a large size, or at a
 scale of the sizes given, and where it has another functional form than the catalogue's, in that on one robot in two.
 
 This file is generated from the catalogue: `YAIR_UPDATE_DOCS=1 cargo test --release -p effects --test document`.
