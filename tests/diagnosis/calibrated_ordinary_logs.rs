@@ -50,21 +50,13 @@ fn of_robot(change: Change, seed: u64) -> Calibrated {
     calibrated(folder.path(), truth_m)
 }
 
-/// Kinds of which standard deviations are known to be too small (docs/diagnosis-benchmark.md has by how
-/// much): two measurements a run, rows that hold up each other, an instrument whose errors grow with distance
-/// and lose a third of its poses, and one log whose instrument errs alike for seconds.
-const TOO_CERTAIN: &[&str] =
-    &["ends of runs", "received 5 ms late", "camera and tags", "one long log of a particle filter"];
-
 #[test]
 fn lengths_of_ordinary_logs_are_within_their_standard_deviations() {
     let (robots, first) = robots();
     // The mean of one robot's errors says nothing of a bias.
     let robots = robots.max(2);
-    let cases: Vec<(&str, Change, u64)> = kinds()
-        .filter(|(kind, ..)| !TOO_CERTAIN.contains(kind))
-        .flat_map(|(kind, change, _)| (first..first + robots).map(move |seed| (*kind, *change, seed)))
-        .collect();
+    let cases: Vec<(&str, Change, u64)> =
+        kinds().flat_map(|(kind, change, _)| (first..first + robots).map(move |seed| (*kind, *change, seed))).collect();
     let found: Vec<(&str, Calibrated)> =
         cases.into_par_iter().map(|(kind, change, seed)| (kind, of_robot(change, seed))).collect();
     let (mut complaints, mut squares) = (Vec::new(), Vec::new());

@@ -19,8 +19,8 @@ use crate::pass_options::{OutlierGate, PassOptions};
 use crate::records::Records;
 use crate::segment::Segment;
 use crate::settings::{
-    MAX_AUTOCORRELATION_LAG, MAX_NOMINAL_DEVIATION, MAX_OBSERVABLE_SIGMA, MIN_CLUSTERS, MIN_NAMED_DIRECTION,
-    MIN_OWN_DIRECTION, MIN_RUNS_TO_HOLD_OUT, MIN_SPARE_CLUSTERS, ROTATED_SENSOR_RAD, WHITENESS_Z,
+    INFORMATION_WEIGHT_RUNS, MAX_AUTOCORRELATION_LAG, MAX_NOMINAL_DEVIATION, MAX_OBSERVABLE_SIGMA, MIN_NAMED_DIRECTION,
+    MIN_OWN_DIRECTION, MIN_RUNS_TO_HOLD_OUT, ROTATED_SENSOR_RAD, WHITENESS_Z,
 };
 use crate::stated_wheels::with_stated_wheels;
 use crate::thinning::{Selection, Thinning};
@@ -368,30 +368,31 @@ impl ModelFit<'_> {
         Ok(extended)
     }
 
-    /// Covariance of the free columns. Where runs are few and innovations white it is the inverse
-    /// information; else it is cluster-robust over runs, with the leverage of each (Liang & Zeger 1986; Bell
-    /// & McCaffrey 2002). A stated distortion of the map adds to it. `terms` are those of the fit. `None`
-    /// where rounding is all that there is of it.
+    /// Covariance of the free columns: the inverse information, and more of the scatter over runs the more
+    /// there are beyond the parameters (cluster-robust, with the leverage of each run; Liang & Zeger 1986;
+    /// Bell & McCaffrey 2002). Both add like variances that are known from so many runs each. Blocks of a run
+    /// do not count: what one leaves goes on in the next. A stated distortion of the map adds to it. `terms`
+    /// are those of the fit. `None` where rounding is all that there is of it.
     #[must_use]
     pub fn covariance(&self, terms: &mut [Box<dyn ModelTerm>]) -> Option<DMatrix<f64>> {
         let free = self.free_basis();
         let (_, inverse) = self.solution.information(&self.columns)?.along(&free).solve()?;
-        let units = self.units(terms);
-        let enough = if self.thinning == Thinning::NONE { MIN_CLUSTERS } else { free.ncols() + MIN_SPARE_CLUSTERS };
-        if units.len() < enough {
-            let own = &inverse + self.map_covariance(&free, &inverse, OwnScatter::NotCounted, terms);
-            return with_variances(&free * own * free.transpose());
+        let runs = &self.solution.pass.runs;
+        let mut along = &inverse + self.map_covariance(&free, &inverse, OwnScatter::NotCounted, terms);
+        if runs.len() > free.ncols() {
+            let clusters = runs.iter().map(|run| run.of(&self.columns).along(&free));
+            let mut robust = ClusterRobust::of(&inverse, clusters).covariance;
+            if let Some(scale) = self.position(Column::GyroScale) {
+                let sigma = self.records.gyro_scale_prior_sigma();
+                // What is known of the scale did not come from the runs, and does not scatter over them.
+                let by_scale = &inverse * free.row(scale).transpose() / sigma;
+                robust += &by_scale * by_scale.transpose();
+            }
+            robust += self.map_covariance(&free, &inverse, OwnScatter::Counted, terms);
+            let spare = (runs.len() - free.ncols()) as f64;
+            along = (robust * spare + along * INFORMATION_WEIGHT_RUNS) / (spare + INFORMATION_WEIGHT_RUNS);
         }
-        let clusters = units.iter().map(|unit| unit.of(&self.columns).along(&free));
-        let mut robust = ClusterRobust::of(&inverse, clusters).covariance;
-        if let Some(scale) = self.position(Column::GyroScale) {
-            let sigma = self.records.gyro_scale_prior_sigma();
-            // What is known of the scale did not come from the runs, and does not scatter over them.
-            let by_scale = &inverse * free.row(scale).transpose() / sigma;
-            robust += &by_scale * by_scale.transpose();
-        }
-        robust += self.map_covariance(&free, &inverse, OwnScatter::Counted, terms);
-        with_variances(&free * robust * free.transpose())
+        with_variances(&free * along * free.transpose())
     }
 
     /// What a stated distortion of the instrument's map adds to the covariance along a basis.

@@ -185,7 +185,8 @@ impl Method for Circular {
             });
         }
         let start = Fit::start(geometry.wheel_separation_m());
-        let missing = "its circles do not tell unequal wheels from a wrong wheelbase: drive smaller ones both ways round";
+        let missing =
+            "its circles do not tell unequal wheels from a wrong wheelbase: drive smaller ones both ways round";
         let normal = DMatrix::from_column_slice(2, 2, start.normal(&runs).0.as_slice());
         well_conditioned(Self::NAME, Parameter::WheelSeparation, &normal, missing)?;
         let fit = start.minimised(&runs);

@@ -244,7 +244,9 @@ impl Method for Ivanjko {
             }
         }
         let Some(last) = last else {
-            return Err(Self::not_applicable("its straight runs do not determine the wheels' difference: drive them longer"));
+            return Err(Self::not_applicable(
+                "its straight runs do not determine the wheels' difference: drive them longer",
+            ));
         };
         let of_radii = covariance(&last, &spins, &at);
         let twice = Covariance::from_diagonal(&DVector::from_vec(vec![2.0, 2.0, 1.0]));

@@ -21,11 +21,11 @@ use motion_programs::Schedule;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::dead_reckoning_jacobian::unobservable;
-use crate::settings::{MIN_COMMON_SCALE_COMPONENT, MIN_NAMED_COMPONENT, STATED_LENGTH_SIGMA};
 use crate::estimate::{
     CalibError, Calibration, Covariance, Extrinsics, GroupInstrument, Method, NotObservable, OdometryNoise, Parameter,
-    Rejected,
-    geometry_covariance, drive, nominal,};
+    Rejected, drive, geometry_covariance, nominal,
+};
+use crate::settings::{MIN_COMMON_SCALE_COMPONENT, MIN_NAMED_COMPONENT, STATED_LENGTH_SIGMA};
 
 /// The method with the settings of its fit.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -19,7 +19,7 @@ use motion_programs::Schedule;
 use nalgebra::{DVector, Dyn, Matrix3, Matrix3xX, OMatrix, Owned, U3, Vector3};
 
 use crate::dead_reckoning_jacobian::{DeadReckoned, GeometryParameters, unobservable};
-use crate::estimate::{CalibError, Calibration, Method, geometry_covariance, drive, nominal};
+use crate::estimate::{CalibError, Calibration, Method, drive, geometry_covariance, nominal};
 use crate::pose_measurements::{PoseMeasurement, PoseMeasurements, Spacing};
 use crate::settings::{HEADING_WEIGHT_M, MIN_SENSITIVITY, SEGMENT_M};
 

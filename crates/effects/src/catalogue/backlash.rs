@@ -8,8 +8,8 @@
 //! derived from teeth.
 
 use dataset::RunInfo;
-use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Side, Wheels};
+use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::{Benchmark, ParameterLaw};

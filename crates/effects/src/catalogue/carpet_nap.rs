@@ -7,8 +7,8 @@
 //! Alias: `floor_slope` that goes with the distance, exactly.
 //! Reference: users' reports, mm/m to cm/m; a rule of thumb.
 
-use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, sin_cos, sinc};
+use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::description::{Description, Summary};
@@ -64,7 +64,9 @@ impl PhysicalEffect for CarpetNap {
         Description {
             summary: Summary::Meaning,
             on_board: ON_BOARD,
-            ..Description::of("the floor's pile takes the wheels with it: a drift in one direction of the room, in proportion to the distance driven")
+            ..Description::of(
+                "the floor's pile takes the wheels with it: a drift in one direction of the room, in proportion to the distance driven",
+            )
         }
     }
 

@@ -7,8 +7,8 @@
 //! Alias: `wheelbase` (q L in wide bends, q b/2 in spins), `turn_rate_wheelbase`.
 //! Reference: rolling resistance with creep in proportion to force; a rule of thumb without figures.
 
-use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Increment, Pose, Wheels};
+use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::Benchmark;
@@ -71,7 +71,10 @@ impl PhysicalEffect for CastorDrag {
     }
 
     fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { drag_rad_m: value_of(values, "drag_rad_m")?, castor_behind_m: value_of(values, "castor_behind_m")? })
+        Some(Self {
+            drag_rad_m: value_of(values, "drag_rad_m")?,
+            castor_behind_m: value_of(values, "castor_behind_m")?,
+        })
     }
 }
 

@@ -10,8 +10,8 @@
 //! 2° a reversal, a rule of thumb.
 
 use dataset::RunInfo;
-use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::Pose;
+use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::Benchmark;
@@ -88,14 +88,12 @@ impl PhysicalEffect for CastorKick {
     fn description() -> Description {
         Description {
             summary: Summary::WithValues(|values| format!("{MEANING} by {}", values.shown("kick_rad", 1e3, "mrad"))),
-            benchmark: Benchmark::of_mean_at(|_, _, stream| vec![("decay_m", stream.log_uniform(0.02, 0.2))]).with_form(
-                "a castor by its differential equation, which turns the robot as it flips",
-                |values, _| {
+            benchmark: Benchmark::of_mean_at(|_, _, stream| vec![("decay_m", stream.log_uniform(0.02, 0.2))])
+                .with_form("a castor by its differential equation, which turns the robot as it flips", |values, _| {
                     let of = |name| value_of(values, name).unwrap_or(0.0);
                     let (gain, trail_m) = (of("kick_rad") / std::f64::consts::PI, 0.5 * of("decay_m"));
                     Box::new(RollingCastor { gain, trail_m, psi_rad: 0.0 })
-                },
-            ),
+                }),
             on_board: ON_BOARD,
             ..Description::of(MEANING)
         }

@@ -53,7 +53,9 @@ impl PhysicalEffect for ClockRate {
             summary: Summary::WithValues(|values| format!("{MEANING}, by {}", values.shown("rate", 100.0, "%"))),
             excitation: Excitation::Conditions("log speeds beside an instrument with a clock of its own"),
             is_clock_rate: true,
-            on_board: OnBoard::Never("a pose by counts has no clock in it, and speeds are by the clock of the log that was fitted"),
+            on_board: OnBoard::Never(
+                "a pose by counts has no clock in it, and speeds are by the clock of the log that was fitted",
+            ),
             ..Description::of(MEANING)
         }
     }

@@ -6,8 +6,8 @@
 //! Alias: `backlash` where reversals are as frequent as metres.
 //! Reference: treads with a grain, a slope under the test floor; 0.1 to 0.5 %, a rule of thumb.
 
-use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Wheels};
+use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::description::{Description, Summary};
@@ -64,7 +64,10 @@ impl PhysicalEffect for DirectionAsymmetry {
     }
 
     fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { left_asymmetry: value_of(values, "left_asymmetry")?, right_asymmetry: value_of(values, "right_asymmetry")? })
+        Some(Self {
+            left_asymmetry: value_of(values, "left_asymmetry")?,
+            right_asymmetry: value_of(values, "right_asymmetry")?,
+        })
     }
 }
 

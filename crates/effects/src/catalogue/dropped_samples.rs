@@ -52,7 +52,9 @@ impl PhysicalEffect for DroppedSamples {
         Description {
             record_fault: RecordFault { is_restored_roughly: true, ..RecordFault::WITH_A_TRACE },
             benchmark: Benchmark::of_fault(|_, stream| vec![("probability", stream.uniform_in(0.01, 0.05))]),
-            on_board: OnBoard::Never("what the wheels did in a missing interval, later readings and an instrument say alone"),
+            on_board: OnBoard::Never(
+                "what the wheels did in a missing interval, later readings and an instrument say alone",
+            ),
             ..Description::of("rows are missing, and with them what the wheels did meanwhile")
         }
     }
@@ -264,7 +266,10 @@ mod tests {
         let (gaps, missing) = gaps(&run);
         assert_eq!((gaps.len(), missing.lost, missing.kept), (2, 1, 0));
         let (mut as_most, mut alone) = (run.clone(), run.clone());
-        assert_eq!((fill(&mut as_most, &gaps, ShortGaps::Lost), fill(&mut alone, &gaps, ShortGaps::AsTheyAre)), (2.0, 1.0));
+        assert_eq!(
+            (fill(&mut as_most, &gaps, ShortGaps::Lost), fill(&mut alone, &gaps, ShortGaps::AsTheyAre)),
+            (2.0, 1.0)
+        );
         assert_eq!(as_most.odometry.wheels, WheelLog::Ticks(Wheels { left: whole.clone(), right: whole.clone() }));
         assert!(as_most.unknown_motion.is_empty() && alone.unknown_motion.is_empty());
         assert_eq!([as_most.restored_motion.len(), alone.restored_motion.len()], [2, 1]);

@@ -7,8 +7,8 @@
 //! Alias: `wheel_eccentricity` at n = 1, exactly.
 //! Reference: geometry of an eccentric disc, A = e/r_disc over the gear's ratio.
 
-use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Side, Wheels};
+use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::description::{Description, Summary};
@@ -83,7 +83,10 @@ impl PhysicalEffect for EncoderCycle {
     }
 
     fn hypothesis() -> Hypothesis {
-        Hypothesis::Terms(Variant::over("cycles", &CYCLES, |cycles| Term { cycles, last: Wheels::both(LastAngle::NONE) }))
+        Hypothesis::Terms(Variant::over("cycles", &CYCLES, |cycles| Term {
+            cycles,
+            last: Wheels::both(LastAngle::NONE),
+        }))
     }
 
     fn description() -> Description {

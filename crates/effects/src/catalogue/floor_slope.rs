@@ -7,8 +7,8 @@
 //! Reference: tyre creep in proportion to side force: weight times slope over stiffness, 0.04 to 0.1 % per
 //! degree.
 
-use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::Pose;
+use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::description::{Description, Summary};

@@ -14,8 +14,8 @@
 //! milliseconds.
 
 use dataset::{Dataset, Timestamps, WheelLog};
-use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::Pose;
+use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::{Benchmark, HostRobot, Needs, ParameterValue};
@@ -209,7 +209,8 @@ fn counted_rows<'r>(
     let extent = RATE_ROWS.max((4.0 * late) as usize);
     let mut sizes: Vec<f64> = counts.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
     let middle = sizes.len() / 2;
-    let most = if sizes.is_empty() { 0.0 } else { MAX_COUNT_RATIO * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 };
+    let most =
+        if sizes.is_empty() { 0.0 } else { MAX_COUNT_RATIO * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 };
     (extent + 1..stamps_s.len().saturating_sub(extent)).filter_map(move |row| {
         let (from, to) = (row - 1 - extent, row + extent);
         let rate = (counts[to] - counts[from]) / (read_s[to] - read_s[from]);
@@ -261,9 +262,8 @@ impl ModelTerm for Term {
             return;
         }
         // What a late stamp makes of a travel is gone with the next one: only the ends count.
-        let [start_m, end_m] = [0, 1].map(|end| {
-            interval.speed_at_ends_m_s[end].map(|speed_m_s| speed_m_s * interval.late_s[end])
-        });
+        let [start_m, end_m] =
+            [0, 1].map(|end| interval.speed_at_ends_m_s[end].map(|speed_m_s| speed_m_s * interval.late_s[end]));
         gradient[0] = interval.change(end_m.zip_with(start_m, |end_m, start_m| end_m - start_m));
     }
 }
@@ -332,7 +332,8 @@ mod tests {
         };
         let stamps_s: Vec<f64> = read_s.iter().map(stamp).collect();
         // A wheel that goes to and fro in 6 s, 2000 counts a second at the most.
-        let counted = |at_s: &[f64]| -> Vec<i64> { at_s.iter().map(|t_s| (2000.0 * t_s.sin()).round() as i64).collect() };
+        let counted =
+            |at_s: &[f64]| -> Vec<i64> { at_s.iter().map(|t_s| (2000.0 * t_s.sin()).round() as i64).collect() };
         let share = |at_s: &[f64]| {
             let mut run = dataset::Run::default();
             run.info.continuous = true;

@@ -9,8 +9,8 @@
 //! Reference: linear tyre, slip angle = side force over cornering stiffness: c = m/C_α, 3 to 10 ms; the moved
 //! centre of rotation of skid steer, far more.
 
-use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, sinc};
+use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::{Benchmark, FloorForm, contact_twist};
@@ -54,15 +54,18 @@ impl PhysicalEffect for LateralSkid {
                 format!("{MEANING}, by {} times speed times yaw rate", values.shown("skid_s", 1e3, "ms"))
             }),
             // Pacejka 2012: the side force of a tyre saturates with its slip angle.
-            benchmark: Benchmark::OF_MEAN.with_form("skid that saturates with the centripetal acceleration", |values, _| {
-                let (skid_s, knee_m_s2) = (value_of(values, "skid_s").unwrap_or(0.0), 0.3);
-                FloorForm::boxed(move |step| {
-                    let (v_m_s, omega_rad_s) = contact_twist(step);
-                    let centripetal_m_s2 = v_m_s * omega_rad_s;
-                    step.lateral_m -=
-                        skid_s * centripetal_m_s2 / (1.0 + centripetal_m_s2.abs() / knee_m_s2) * step.dt_s;
-                })
-            }),
+            benchmark: Benchmark::OF_MEAN.with_form(
+                "skid that saturates with the centripetal acceleration",
+                |values, _| {
+                    let (skid_s, knee_m_s2) = (value_of(values, "skid_s").unwrap_or(0.0), 0.3);
+                    FloorForm::boxed(move |step| {
+                        let (v_m_s, omega_rad_s) = contact_twist(step);
+                        let centripetal_m_s2 = v_m_s * omega_rad_s;
+                        step.lateral_m -=
+                            skid_s * centripetal_m_s2 / (1.0 + centripetal_m_s2.abs() / knee_m_s2) * step.dt_s;
+                    })
+                },
+            ),
             on_board: OnBoard::Static(ON_BOARD),
             ..Description::of(MEANING)
         }

@@ -7,8 +7,8 @@
 //! Alias: `turn_rate_wheelbase` (0.98 on circles).
 //! Reference: the balance of moments of a rigid body on springs; 0.2 % at v ω = 0.5 m/s² for a soft tyre.
 
-use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Increment, Pose, Wheels};
+use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::description::{Description, Summary};

@@ -11,8 +11,8 @@
 //! likely, which a speed that is a whole number of units a cycle breaks.
 //! Reference: users' reports of integer odometry; the mean of a uniform fraction.
 
-use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Side, Wheels};
+use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::Benchmark;
@@ -75,7 +75,10 @@ impl PhysicalEffect for LowSpeedTruncation {
     }
 
     fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { loss_m_s: value_of(values, "loss_m_s")?, cycle_s: value_of(values, "cycle_s").unwrap_or(TYPICAL_CYCLE_S) })
+        Some(Self {
+            loss_m_s: value_of(values, "loss_m_s")?,
+            cycle_s: value_of(values, "cycle_s").unwrap_or(TYPICAL_CYCLE_S),
+        })
     }
 }
 

@@ -8,8 +8,8 @@
 //! Reference: the HCTL-1100's input filter (a state must stand three clocks); interrupt-driven counters
 //! behave alike. 0.1 to 2 %, a rule of thumb.
 
-use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Side, Wheels};
+use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::{Benchmark, ParameterLaw};
@@ -78,14 +78,17 @@ impl PhysicalEffect for MissedCounts {
                     },
                     positive: true,
                 },
-                ..Benchmark::OF_MEAN.with_form("a hinge that is round over a tenth of the cruise speed", |values, robot| {
-                    let of = |name| value_of(values, name).unwrap_or(0.0);
-                    Box::new(RoundHinge {
-                        lost_share: Wheels { left: of("left_lost_share"), right: of("right_lost_share") },
-                        hinge_m_s: of("hinge_speed_m_s"),
-                        width_m_s: 0.1 * robot.cruise_speed_m_s,
-                    })
-                })
+                ..Benchmark::OF_MEAN.with_form(
+                    "a hinge that is round over a tenth of the cruise speed",
+                    |values, robot| {
+                        let of = |name| value_of(values, name).unwrap_or(0.0);
+                        Box::new(RoundHinge {
+                            lost_share: Wheels { left: of("left_lost_share"), right: of("right_lost_share") },
+                            hinge_m_s: of("hinge_speed_m_s"),
+                            width_m_s: 0.1 * robot.cruise_speed_m_s,
+                        })
+                    },
+                )
             },
             on_board: OnBoard::Static(ON_BOARD),
             ..Description::of(MEANING)

@@ -7,11 +7,11 @@
 //! Alias: `thermal_drift` and `wear` where the payload was changed once.
 //! Reference: a linear spring; 0.1 to 1 % for a load that the robot is made for, a rule of thumb.
 
-use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Wheels};
+use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
-use crate::benchmark::{Benchmark, HostRobot, ParameterValue, Needs};
+use crate::benchmark::{Benchmark, HostRobot, Needs, ParameterValue};
 use crate::description::{Description, Excitation, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, RunStart, Step};
@@ -72,10 +72,7 @@ impl PhysicalEffect for PayloadCompression {
         Description {
             summary: Summary::Meaning,
             excitation: Excitation::Conditions("drive the same runs with another payload, its covariate stated"),
-            benchmark: Benchmark {
-                needs: Needs { payload: true, ..Needs::NONE },
-                ..Benchmark::OF_MEAN
-            },
+            benchmark: Benchmark { needs: Needs { payload: true, ..Needs::NONE }, ..Benchmark::OF_MEAN },
             on_board: ON_BOARD,
             ..Description::of("the payload presses the tyres flatter")
         }
@@ -83,7 +80,8 @@ impl PhysicalEffect for PayloadCompression {
 
     /// Unloaded: what the runs carry is the experiment's.
     fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
-        let (common_per_kg, mismatch_per_kg) = (value_of(values, "common_per_kg")?, value_of(values, "mismatch_per_kg")?);
+        let (common_per_kg, mismatch_per_kg) =
+            (value_of(values, "common_per_kg")?, value_of(values, "mismatch_per_kg")?);
         Some(Self { common_per_kg, mismatch_per_kg, payload_kg: vec![value_of(values, PAYLOAD).unwrap_or(0.0)] })
     }
 

@@ -64,10 +64,7 @@ impl PhysicalEffect for Quantization {
     }
 
     fn description() -> Description {
-        Description {
-            on_board: ON_BOARD,
-            ..Description::of("the log keeps whole ticks of several counts each")
-        }
+        Description { on_board: ON_BOARD, ..Description::of("the log keeps whole ticks of several counts each") }
     }
 
     fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {

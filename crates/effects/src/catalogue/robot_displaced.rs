@@ -55,7 +55,9 @@ impl PhysicalEffect for RobotDisplaced {
 
     fn description() -> Description {
         Description {
-            excitation: Excitation::Conditions("drive where nothing touches the robot and its wheels stay on the floor"),
+            excitation: Excitation::Conditions(
+                "drive where nothing touches the robot and its wheels stay on the floor",
+            ),
             on_board: OnBoard::Never("the counts show nothing of it"),
             ..Description::of("the robot is pushed, or its wheels turn without the floor")
         }

@@ -6,8 +6,8 @@
 //! Alias: `slip_acceleration` of one wheel.
 //! Reference: two HCTL-1100 that share no sampling: δ up to one sample time, 0.06 to 2 ms.
 
-use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Wheels};
+use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::description::{Description, Summary};

@@ -7,8 +7,8 @@
 //! Alias: `truth_latency`, exactly: equal κ on both wheels is a time shift.
 //! Reference: tyre slip stiffness; κ = v/(C_s g) with C_s = 20 to 40 gives 1 to 10 ms.
 
-use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::Pose;
+use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::{Benchmark, FloorForm};
@@ -56,14 +56,18 @@ impl PhysicalEffect for SlipAcceleration {
     fn description() -> Description {
         Description {
             summary: Summary::WithValues(|values| format!("{MEANING} by {}", values.shown("kappa_s", 1e3, "ms"))),
-            benchmark: Benchmark::OF_MEAN.with_form("slip that saturates, as tanh of the acceleration", |values, robot| {
-                let (kappa_s, knee_m_s2) = (value_of(values, "kappa_s").unwrap_or(0.0), 0.7 * robot.acceleration_m_s2);
-                FloorForm::boxed(move |step| {
-                    let acceleration = step.contact_acceleration_m_s2();
-                    let lost_m = |a: f64| kappa_s * knee_m_s2 * (a / knee_m_s2).tanh() * step.dt_s;
-                    step.travel_m = step.travel_m.zip_with(acceleration, |travel_m, a| travel_m - lost_m(a));
-                })
-            }),
+            benchmark: Benchmark::OF_MEAN.with_form(
+                "slip that saturates, as tanh of the acceleration",
+                |values, robot| {
+                    let (kappa_s, knee_m_s2) =
+                        (value_of(values, "kappa_s").unwrap_or(0.0), 0.7 * robot.acceleration_m_s2);
+                    FloorForm::boxed(move |step| {
+                        let acceleration = step.contact_acceleration_m_s2();
+                        let lost_m = |a: f64| kappa_s * knee_m_s2 * (a / knee_m_s2).tanh() * step.dt_s;
+                        step.travel_m = step.travel_m.zip_with(acceleration, |travel_m, a| travel_m - lost_m(a));
+                    })
+                },
+            ),
             on_board: ON_BOARD,
             ..Description::of(MEANING)
         }

@@ -6,8 +6,8 @@
 //! Alias: `missed_counts`, load, `turn_rate_wheelbase`.
 //! Reference: longitudinal slip with rolling resistance that grows with speed; sizes are rules of thumb.
 
-use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::Pose;
+use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::{Benchmark, FloorForm};
@@ -52,14 +52,17 @@ impl PhysicalEffect for SlipSpeed {
                 format!("{MEANING}: {} of it for each m/s", values.shown("slip_s_m", 100.0, "%"))
             }),
             // Pacejka 2012: the force of a tyre saturates with its slip.
-            benchmark: Benchmark::OF_MEAN.with_form("the share lost saturates, as tanh of the speed", |values, robot| {
-                let (lost, knee_m_s) = (value_of(values, "slip_s_m").unwrap_or(0.0), 0.7 * robot.cruise_speed_m_s);
-                FloorForm::boxed(move |step| {
-                    let speed_m_s = step.contact_speed_m_s();
-                    let share = |v: f64| 1.0 - lost * knee_m_s * (v.abs() / knee_m_s).tanh();
-                    step.travel_m = step.travel_m.zip_with(speed_m_s, |travel_m, v| travel_m * share(v));
-                })
-            }),
+            benchmark: Benchmark::OF_MEAN.with_form(
+                "the share lost saturates, as tanh of the speed",
+                |values, robot| {
+                    let (lost, knee_m_s) = (value_of(values, "slip_s_m").unwrap_or(0.0), 0.7 * robot.cruise_speed_m_s);
+                    FloorForm::boxed(move |step| {
+                        let speed_m_s = step.contact_speed_m_s();
+                        let share = |v: f64| 1.0 - lost * knee_m_s * (v.abs() / knee_m_s).tanh();
+                        step.travel_m = step.travel_m.zip_with(speed_m_s, |travel_m, v| travel_m * share(v));
+                    })
+                },
+            ),
             on_board: OnBoard::Static(ON_BOARD),
             ..Description::of(MEANING)
         }

@@ -11,15 +11,15 @@
 //! renewal process, Cox 1962.
 
 use dataset::RunInfo;
-use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Side, Wheels};
+use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::Benchmark;
 use crate::description::{Description, IsolatedError};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
-use crate::hypothesis::{Hypothesis, Variant, Sign, value_of};
+use crate::hypothesis::{Hypothesis, Sign, Variant, value_of};
 use crate::on_board::{Code, OnBoard};
 use crate::stream::Stream;
 
@@ -88,8 +88,9 @@ impl PhysicalEffect for StickSlip {
     }
 
     fn hypothesis() -> Hypothesis {
-        let terms =
-            Variant::along("stick_speed_m_s", &STICK_SPEEDS_M_S, |stick_speed_m_s| Box::new(Term::new(stick_speed_m_s)));
+        let terms = Variant::along("stick_speed_m_s", &STICK_SPEEDS_M_S, |stick_speed_m_s| {
+            Box::new(Term::new(stick_speed_m_s))
+        });
         Hypothesis::TermsAndScatter(terms, &[Sign::TailsAtLowSpeed])
     }
 
@@ -105,7 +106,10 @@ impl PhysicalEffect for StickSlip {
     }
 
     fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
-        Some(Self { stick_speed_m_s: value_of(values, "stick_speed_m_s")?, breakaway_m: value_of(values, "breakaway_m")? })
+        Some(Self {
+            stick_speed_m_s: value_of(values, "stick_speed_m_s")?,
+            breakaway_m: value_of(values, "breakaway_m")?,
+        })
     }
 }
 
@@ -248,8 +252,9 @@ mod tests {
         // Distances in breakaways, the last one back.
         for distances in [&[0.5][..], &[1.0], &[3.0], &[8.0], &[3.0, -1.0], &[3.0, -4.0]] {
             let term = Term::new(stick_speed_m_s);
-            let expected =
-                distances.iter().fold(0.0, |wound, distance| term.next(wound, distance * breakaway_m, distance.signum() * speed_m_s));
+            let expected = distances
+                .iter()
+                .fold(0.0, |wound, distance| term.next(wound, distance * breakaway_m, distance.signum() * speed_m_s));
             let mut wound = Vec::new();
             for run in 0..2000 {
                 let mut state = StickSlip { stick_speed_m_s, breakaway_m }.forward().expect("acts on the floor");

@@ -84,7 +84,9 @@ impl Forward for State {
 fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
     let changed = |wheels: &mut WheelLog| match wheels {
         WheelLog::Ticks(Wheels { left, right }) => std::mem::swap(left, right),
-        WheelLog::Angles(Wheels { left, right }) | WheelLog::Speeds(Wheels { left, right }) => std::mem::swap(left, right),
+        WheelLog::Angles(Wheels { left, right }) | WheelLog::Speeds(Wheels { left, right }) => {
+            std::mem::swap(left, right)
+        }
         WheelLog::Twist { .. } => {}
     };
     let turned =

@@ -7,8 +7,8 @@
 //! Reference: a lumped heat capacity (Newton's law of cooling) and linear expansion; 0.2 % over 10 to 60
 //! minutes for rubber.
 
-use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Wheels};
+use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::Benchmark;
@@ -67,13 +67,11 @@ impl PhysicalEffect for ThermalDrift {
                 format!("{MEANING}, by {} in the end", values.shown("growth", 100.0, "%"))
             }),
             excitation: Excitation::Conditions("drive the same runs cold and an hour later"),
-            benchmark: Benchmark::of_mean_at(|_, _, stream| vec![("tau_s", stream.log_uniform(60.0, 1000.0))]).with_form(
-                "wheels that warm up hyperbolically: t/(t + τ) for 1 − e^{−t/τ}",
-                |values, _| {
+            benchmark: Benchmark::of_mean_at(|_, _, stream| vec![("tau_s", stream.log_uniform(60.0, 1000.0))])
+                .with_form("wheels that warm up hyperbolically: t/(t + τ) for 1 − e^{−t/τ}", |values, _| {
                     let of = |name| value_of(values, name).unwrap_or(0.0);
                     Box::new(Warming { growth: of("growth"), tau_s: of("tau_s"), session_s: 0.0 })
-                },
-            ),
+                }),
             on_board: ON_BOARD,
             ..Description::of(MEANING)
         }

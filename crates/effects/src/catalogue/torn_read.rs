@@ -53,7 +53,10 @@ impl PhysicalEffect for TornRead {
     fn description() -> Description {
         Description {
             benchmark: Benchmark::of_fault(|_, stream| {
-                vec![("probability", stream.uniform_in(0.005, 0.02)), ("jump_counts", [256.0, 65_536.0][stream.below(2)])]
+                vec![
+                    ("probability", stream.uniform_in(0.005, 0.02)),
+                    ("jump_counts", [256.0, 65_536.0][stream.below(2)]),
+                ]
             }),
             on_board: OnBoard::Never("what is torn shows in the readings after it alone"),
             ..Description::of("a count of several bytes is read while it changes")

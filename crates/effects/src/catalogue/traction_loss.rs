@@ -11,15 +11,15 @@
 //! Reference: Stribeck friction, Armstrong-Hélouvry et al. 1994.
 
 use dataset::RunInfo;
-use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Side, Wheels};
+use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::{Benchmark, HostRobot, ParameterValue};
 use crate::description::{Description, IsolatedError};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, RunStart, Step};
-use crate::hypothesis::{Hypothesis, Variant, Sign, value_of};
+use crate::hypothesis::{Hypothesis, Sign, Variant, value_of};
 
 mod on_board;
 
@@ -232,7 +232,8 @@ impl Term {
 
     /// How fast the ground gains on a tread that is so much faster, m/s².
     fn pull_m_s2(&self, gap_m_s: f64) -> f64 {
-        let left = SLIDING_FRICTION_RATIO + (1.0 - SLIDING_FRICTION_RATIO) * (-gap_m_s.abs() / TYPICAL_STRIBECK_M_S).exp();
+        let left =
+            SLIDING_FRICTION_RATIO + (1.0 - SLIDING_FRICTION_RATIO) * (-gap_m_s.abs() / TYPICAL_STRIBECK_M_S).exp();
         self.grip_m_s2 * left * (gap_m_s / TREAD_JITTER_M_S).clamp(-1.0, 1.0)
     }
 

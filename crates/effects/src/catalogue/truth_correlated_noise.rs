@@ -52,7 +52,9 @@ impl PhysicalEffect for TruthCorrelatedNoise {
                 (vec![("sigma_xy_m", 1e-3), ("sigma_theta_rad", 1e-3)], vec![("tau_s", stream.log_uniform(0.3, 3.0))])
             }),
             on_board: OnBoard::OfInstrument,
-            ..Description::of("the instrument's errors are autocorrelated: it is less precise than its single measurements seem")
+            ..Description::of(
+                "the instrument's errors are autocorrelated: it is less precise than its single measurements seem",
+            )
         }
     }
 

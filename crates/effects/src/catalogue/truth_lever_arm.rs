@@ -8,8 +8,8 @@
 //! Alias: `lateral_skid` at one speed.
 //! Reference: Censi et al. 2013, the sensor's place on the robot.
 
-use model_term::{Measurement, ModelTerm, TermParameter};
 use kinematics::Pose;
+use model_term::{Measurement, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::description::{Description, Extrinsic, Summary};

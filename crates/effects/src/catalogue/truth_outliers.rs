@@ -149,8 +149,8 @@ mod tests {
 
     #[test]
     fn more_outliers_are_the_same_ones_and_others() {
-        let [few, many] =
-            [0.05, 0.3].map(|probability| mahalanobis_distance(TruthOutliers { probability, jump_m: 0.03, jump_rad: 0.1 }, 500));
+        let [few, many] = [0.05, 0.3]
+            .map(|probability| mahalanobis_distance(TruthOutliers { probability, jump_m: 0.03, jump_rad: 0.1 }, 500));
         let jumped = |poses: &[Pose]| poses.iter().filter(|pose| **pose != Pose::IDENTITY).count();
         assert!(jumped(&few) > 0 && jumped(&many) > jumped(&few));
         for (few, many) in few.iter().zip(&many).filter(|(few, _)| **few != Pose::IDENTITY) {

@@ -7,8 +7,8 @@
 //! `lateral_skid` at one yaw rate.
 //! Reference: Censi et al. 2013, the sensor's orientation on the robot.
 
-use model_term::{Measurement, ModelTerm, TermParameter};
 use kinematics::Pose;
+use model_term::{Measurement, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::description::{Description, Extrinsic, Summary};

@@ -8,8 +8,8 @@
 //! Reference: a rule of thumb, 0.1 to 3 %; users report a wheel separation multiplier that depends on the yaw
 //! rate.
 
-use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::Pose;
+use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::{Benchmark, FloorForm, contact_twist};
@@ -49,16 +49,21 @@ impl PhysicalEffect for TurnRateWheelbase {
 
     fn description() -> Description {
         Description {
-            summary: Summary::WithValues(|values| format!("{MEANING}: {} for each rad/s", values.shown("beta_s", 100.0, "%"))),
-            benchmark: Benchmark::OF_MEAN.with_form("a wheelbase that grows with the square of the yaw rate", |values, robot| {
-                // The same at the yaw rate of a spin at cruise speed.
-                let beta_s = value_of(values, "beta_s").unwrap_or(0.0);
-                let at_rad_s = 2.0 * robot.cruise_speed_m_s / robot.wheel_separation_m;
-                FloorForm::boxed(move |step| {
-                    let (_, omega_rad_s) = contact_twist(step);
-                    step.wheel_separation_m *= 1.0 + beta_s * omega_rad_s.powi(2) / at_rad_s;
-                })
+            summary: Summary::WithValues(|values| {
+                format!("{MEANING}: {} for each rad/s", values.shown("beta_s", 100.0, "%"))
             }),
+            benchmark: Benchmark::OF_MEAN.with_form(
+                "a wheelbase that grows with the square of the yaw rate",
+                |values, robot| {
+                    // The same at the yaw rate of a spin at cruise speed.
+                    let beta_s = value_of(values, "beta_s").unwrap_or(0.0);
+                    let at_rad_s = 2.0 * robot.cruise_speed_m_s / robot.wheel_separation_m;
+                    FloorForm::boxed(move |step| {
+                        let (_, omega_rad_s) = contact_twist(step);
+                        step.wheel_separation_m *= 1.0 + beta_s * omega_rad_s.powi(2) / at_rad_s;
+                    })
+                },
+            ),
             on_board: OnBoard::Static(ON_BOARD),
             ..Description::of(MEANING)
         }

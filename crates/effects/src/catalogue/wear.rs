@@ -6,8 +6,8 @@
 //! Alias: `thermal_drift`, at 1.00 while the mean speed is steady: a long pause discriminates them.
 //! Reference: Archard 1953, wear in proportion to the distance; negligible within a session.
 
-use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Wheels};
+use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::description::{Description, Excitation, Summary};

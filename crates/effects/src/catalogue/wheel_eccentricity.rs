@@ -7,8 +7,8 @@
 //! Reference: geometry of a circular wheel on an offset axis, to first order in the offset; 0.1 to 1 %, a
 //! rule of thumb.
 
-use model_term::{Interval, ModelTerm, TermParameter};
 use kinematics::{Pose, Side, Wheels, sinc};
+use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::Benchmark;

@@ -41,7 +41,11 @@ impl PhysicalEffect for WheelMismatch {
     }
 
     fn description() -> Description {
-        Description { geometry: Some((GeometryRatio::RightOverLeft, "right_over_left")), on_board: OnBoard::Geometry, ..Description::of("the wheels differ in diameter") }
+        Description {
+            geometry: Some((GeometryRatio::RightOverLeft, "right_over_left")),
+            on_board: OnBoard::Geometry,
+            ..Description::of("the wheels differ in diameter")
+        }
     }
 
     fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {

@@ -39,7 +39,11 @@ impl PhysicalEffect for WheelScale {
     }
 
     fn description() -> Description {
-        Description { geometry: Some((GeometryRatio::Wheels, "scale")), on_board: OnBoard::Geometry, ..Description::of("both wheels are larger or smaller than nominal, by one factor") }
+        Description {
+            geometry: Some((GeometryRatio::Wheels, "scale")),
+            on_board: OnBoard::Geometry,
+            ..Description::of("both wheels are larger or smaller than nominal, by one factor")
+        }
     }
 
     fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {

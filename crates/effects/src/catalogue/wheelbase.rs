@@ -36,7 +36,11 @@ impl PhysicalEffect for Wheelbase {
     }
 
     fn description() -> Description {
-        Description { geometry: Some((GeometryRatio::Separation, "ratio")), on_board: OnBoard::Geometry, ..Description::of("the effective wheelbase is larger or smaller than nominal") }
+        Description {
+            geometry: Some((GeometryRatio::Separation, "ratio")),
+            on_board: OnBoard::Geometry,
+            ..Description::of("the effective wheelbase is larger or smaller than nominal")
+        }
     }
 
     fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {

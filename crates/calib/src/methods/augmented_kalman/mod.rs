@@ -27,7 +27,7 @@ pub use follow::{Followed, settled_at};
 pub use noise::{NoiseFilter, NoiseSource, Variances};
 
 use crate::dead_reckoning_jacobian::unobservable;
-use crate::estimate::{CalibError, Calibration, Method, geometry_covariance, drive, nominal};
+use crate::estimate::{CalibError, Calibration, Method, drive, geometry_covariance, nominal};
 use crate::pose_measurements::{PoseMeasurement, PoseMeasurements, Spacing};
 use crate::settings::{
     FACTOR_PRIOR_SIGMA, HEADING_SIGMA_GUESS_RAD, MAX_PASSES, MAX_POSTERIOR_TO_PRIOR_SIGMA, MEASUREMENT_SPACING_M,

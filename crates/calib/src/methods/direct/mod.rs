@@ -19,7 +19,7 @@ use dataset::{LANES, PointReading, Protocol, Replicates, RunView, Session};
 use kinematics::{Branching, DriveGeometry, Point, Side, Wheels};
 use motion_programs::Schedule;
 
-use formulas::{NAME, WHEELBASE, Marks, Spin, calibration, check_marks, not_applicable, outermost, outlier, outside_m};
+use formulas::{Marks, NAME, Spin, WHEELBASE, calibration, check_marks, not_applicable, outermost, outlier, outside_m};
 
 use crate::estimate::{CalibError, Calibration, Method, Parameter, Rejected, nominal};
 use crate::pose_measurements::EndPoses;
@@ -60,8 +60,7 @@ struct MarkReader<'s, 'a> {
 
 impl<'s, 'a> MarkReader<'s, 'a> {
     fn new(session: &'s Session<'a>) -> Result<Self, CalibError> {
-        let geometry =
-            session.robot.geometry().map_err(|source| CalibError::NotADrive { method: NAME, source })?;
+        let geometry = session.robot.geometry().map_err(|source| CalibError::NotADrive { method: NAME, source })?;
         Ok(Self { session, geometry, outermost: outermost(session.points) })
     }
 

@@ -10,10 +10,7 @@ use crate::estimate::{CalibError, Calibration};
 use crate::robust_lanes::{RetainedLanes, SummaryLanes};
 
 /// The calibration of every trial; `None` where it is to be calibrated by itself.
-pub(super) fn calibrations(
-    form: Form,
-    replicates: &Replicates,
-) -> [Option<Result<Calibration, CalibError>>; LANES] {
+pub(super) fn calibrations(form: Form, replicates: &Replicates) -> [Option<Result<Calibration, CalibError>>; LANES] {
     let lanes = InputLanes::of(replicates).map(|input| (InstructionSet::widest().run(EndErrors(&input)), input));
     std::array::from_fn(|lane| {
         let ([cw, ccw], input) = lanes.as_ref()?;
@@ -51,11 +48,12 @@ impl<'r, const W: usize> InputLanes<'r, W> {
             Odometry { m_per_count, wheel_separation_m: geometry.wheel_separation_m(), rule: Rule::Midpoint };
         let squares = |protocol| {
             let runs = replicates.runs.iter().filter(move |run| run.info.protocol == Some(protocol));
-            runs.map(|run| SquareLanes::of(run, &replicates.points)).collect::<Option<Vec<_>>>().filter(|squares| !squares.is_empty())
+            runs.map(|run| SquareLanes::of(run, &replicates.points))
+                .collect::<Option<Vec<_>>>()
+                .filter(|squares| !squares.is_empty())
         };
-        let is_square = |run: &&ReplicatedRun<W>| {
-            matches!(run.info.protocol, Some(Protocol::SquareCw | Protocol::SquareCcw))
-        };
+        let is_square =
+            |run: &&ReplicatedRun<W>| matches!(run.info.protocol, Some(Protocol::SquareCw | Protocol::SquareCcw));
         let mut sides = replicates.runs.iter().filter(is_square).map(|run| run.info.settings.side_m);
         let side_m = sides.next()??;
         if sides.any(|other| other != Some(side_m)) {

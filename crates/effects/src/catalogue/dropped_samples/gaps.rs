@@ -270,9 +270,8 @@ pub(super) fn gaps(run: &Run) -> (Vec<Gap>, Missing) {
         let sides = [&before[..of_each.min(before.len())], &after[..of_each.min(after.len())]];
         let around: Vec<usize> = sides.concat();
         let time_s: f64 = around.iter().map(|near| t_s[near + 1] - t_s[*near]).sum();
-        let counts_of = |rows: &[usize]| {
-            Wheels::from_sides(|side| rows.iter().map(|near| shown[side][*near]).sum::<f64>())
-        };
+        let counts_of =
+            |rows: &[usize]| Wheels::from_sides(|side| rows.iter().map(|near| shown[side][*near]).sum::<f64>());
         // Counts of the gap at the speed around it, and of a row to either side of it.
         let due = counts_of(&around).map(|counts| match time_s > 0.0 {
             true => counts / time_s * (t_s[k + 1] - t_s[k]),
