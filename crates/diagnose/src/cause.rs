@@ -4,6 +4,7 @@ use effects::Covariate;
 
 use crate::check::{Check, ResidualPersistence};
 use crate::document::UnlistedTerm;
+use crate::errors_at_rest::ErrorsAtRest;
 use crate::geometry_deviation::GeometryDeviation;
 use crate::unknown_motion::Anomaly;
 
@@ -65,10 +66,8 @@ pub(crate) enum Basis {
     IsolatedErrors(usize, usize),
     /// Large errors, by what follows them.
     LargeErrors(ResidualPersistence),
-    /// Autocorrelated errors with this coefficient.
-    Autocorrelated(f64),
-    /// The same where the instrument's errors are not while the robot stands.
-    AutocorrelatedInMotion(f64),
+    /// Autocorrelated errors with this coefficient, and what they are while the robot stands.
+    Autocorrelated(f64, ErrorsAtRest),
     /// Headings scatter with the turn, rad/√rad.
     TurnScatter(f64),
 }
@@ -76,14 +75,7 @@ pub(crate) enum Basis {
 impl Basis {
     /// Whether what an effect in the model leaves, its form being known roughly, may give such a finding.
     pub(crate) const fn may_be_error_of_form(&self) -> bool {
-        matches!(
-            self,
-            Self::FailedTests(_)
-                | Self::LargeErrors(_)
-                | Self::Autocorrelated(_)
-                | Self::AutocorrelatedInMotion(_)
-                | Self::TurnScatter(_)
-        )
+        matches!(self, Self::FailedTests(_) | Self::LargeErrors(_) | Self::Autocorrelated(..) | Self::TurnScatter(_))
     }
 }
 

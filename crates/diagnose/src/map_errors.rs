@@ -25,7 +25,7 @@ pub(crate) fn without_map_errors(findings: &mut Vec<Finding>, base: &ModelFit<'_
     }
     findings.retain_mut(|finding| {
         let (trials, level) = match finding.basis {
-            Basis::FailedTests(_) | Basis::Autocorrelated(_) | Basis::AutocorrelatedInMotion(_) => return false,
+            Basis::FailedTests(_) | Basis::Autocorrelated(..) => return false,
             Basis::Products(trials) => (trials, SPARSE_TERM_LEVEL),
             _ => (CATALOGUE.len(), SCAN_LEVEL),
         };

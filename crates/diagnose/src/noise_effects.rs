@@ -16,7 +16,7 @@ use crate::candidate::terms;
 use crate::cause::{Basis, Cause, Doubt};
 use crate::check::{Check, Component, ResidualPersistence};
 use crate::document::Value;
-use crate::errors_at_rest::are_white_at_rest;
+use crate::errors_at_rest::{ErrorsAtRest, errors_at_rest};
 use crate::finding;
 use crate::finding::Finding;
 use crate::mean_structure::MeanStructure;
@@ -41,6 +41,13 @@ pub(crate) fn scatter(structure: &MeanStructure<'_>, recorded: &[Dataset], witho
         // The model does not follow the robot at all: that has no name.
         return findings;
     }
+    // Errors that last, with what they are while the robot stands: an instrument errs then, too, unless its
+    // errors go with the place.
+    let lasting = structure
+        .correlated
+        .filter(|(coefficient, _)| *coefficient > 0.0)
+        .map(|(coefficient, sigmas)| (coefficient, sigmas, errors_at_rest(recorded, coefficient)));
+    let may_be_motions = lasting.is_some_and(|(.., at_rest)| at_rest != ErrorsAtRest::Autocorrelated);
     let turns = of_turns(structure, without_ids);
     let p_of_dependence = tests.iter().filter(|test| test.shows_dependence());
     let p_of_dependence = p_of_dependence.map(|test| test.p_value).fold(1.0, f64::min);
@@ -57,7 +64,11 @@ pub(crate) fn scatter(structure: &MeanStructure<'_>, recorded: &[Dataset], witho
         let share = outliers.isolated as f64 / (outliers.measurements + rejected) as f64;
         let value = Value { value: share, sigma: None, unit: "1".to_owned() };
         let of = outliers.measurements + rejected;
-        let causes = with_sign(Sign::IsolatedErrors, without_ids);
+        let mut causes = with_sign(Sign::IsolatedErrors, without_ids);
+        // What errs for a while at a time errs much at times.
+        if !causes.is_empty() && may_be_motions {
+            causes.push(Cause::Unknown);
+        }
         let parameters = BTreeMap::from([("probability".to_owned(), value)]);
         let basis = Basis::IsolatedErrors(outliers.isolated, of);
         findings.push(finding::of_causes(causes, outliers.p_value, parameters, basis));
@@ -115,21 +126,16 @@ pub(crate) fn scatter(structure: &MeanStructure<'_>, recorded: &[Dataset], witho
             findings.push(finding::of_likely_scatter(likely, any, or_unlisted, p_value, basis));
         }
     }
-    if let Some((coefficient, sigmas)) = structure.correlated
-        && coefficient > 0.0
-    {
+    if let Some((coefficient, sigmas, at_rest)) = lasting {
         let mut causes = with_sign(Sign::AutocorrelatedErrors, without_ids);
         // Where something else is found too, it may be that this is the rest of it.
-        if !causes.is_empty() && (structure.spurious || !structure.found.model.candidates.is_empty()) {
+        let may_be_rest = structure.spurious || !structure.found.model.candidates.is_empty();
+        if at_rest == ErrorsAtRest::White {
+            causes.insert(0, Cause::Unknown);
+        } else if !causes.is_empty() && (may_be_rest || at_rest == ErrorsAtRest::WhiteOrSlow) {
             causes.push(Cause::Unknown);
         }
-        let mut basis = Basis::Autocorrelated(coefficient);
-        // An instrument errs while the robot stands, too, unless its errors go with the place.
-        if are_white_at_rest(recorded, coefficient) == Some(true) {
-            causes.retain(|cause| !cause.is_unlisted());
-            causes.insert(0, Cause::Unknown);
-            basis = Basis::AutocorrelatedInMotion(coefficient);
-        }
+        let basis = Basis::Autocorrelated(coefficient, at_rest);
         findings.push(finding::of_causes(causes, p_of_z(sigmas), BTreeMap::new(), basis));
     }
     findings.extend(turns);

@@ -9,6 +9,7 @@ use crate::carry_over::{CarryOver, Level};
 use crate::cause::{Basis, Cause, Doubt};
 use crate::check::{Check, ResidualPersistence};
 use crate::document::{self, Gain, GainLevel, Subsample, UnlistedTerm, Value, Verdict};
+use crate::errors_at_rest::ErrorsAtRest;
 use crate::finding::Finding;
 use crate::heterogeneity::Heterogeneity;
 use crate::settings::findings::MAX_EVENTS_SHOWN;
@@ -237,10 +238,13 @@ fn basis(finding: &Finding) -> String {
         Basis::LargeErrors(ResidualPersistence::Undecided) => {
             "errors have heavier tails than normal ones, and the next measurements do not say whether robot or instrument erred".to_owned()
         }
-        Basis::Autocorrelated(coefficient) => format!(
+        Basis::Autocorrelated(coefficient, ErrorsAtRest::Autocorrelated) => format!(
             "measurement errors are autocorrelated (lag-one coefficient {coefficient:.2}), and no term that was tried explains it"
         ),
-        Basis::AutocorrelatedInMotion(coefficient) => format!(
+        Basis::Autocorrelated(coefficient, ErrorsAtRest::WhiteOrSlow) => format!(
+            "errors are autocorrelated (lag-one coefficient {coefficient:.2}), and no term that was tried explains it; while the robot stands they are white, but it stands too shortly to tell: the instrument errs slowly, or motions err for a while at a time. Let the robot stand for a minute"
+        ),
+        Basis::Autocorrelated(coefficient, ErrorsAtRest::White) => format!(
             "errors are autocorrelated while the robot moves (lag-one coefficient {coefficient:.2}) and not while it stands: motions err for a while at a time, as where the floor differs"
         ),
         Basis::TurnScatter(sigma) => format!("headings scatter with the turn, by {:.1} mrad/√rad", 1e3 * sigma),

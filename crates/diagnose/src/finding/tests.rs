@@ -3,6 +3,7 @@
 use effects::Covariate;
 
 use super::*;
+use crate::errors_at_rest::ErrorsAtRest;
 
 const SLIP: Cause = Cause::Effect("slip_speed");
 const CASTOR: Cause = Cause::Effect("castor_drag");
@@ -43,7 +44,7 @@ fn a_finding_of_low_significance_may_be_something_else() {
 
 #[test]
 fn a_weak_mean_effect_beside_a_strong_uncatalogued_one_is_probably_part_of_it() {
-    let unknown = of_causes(vec![], 1e-20, BTreeMap::new(), Basis::Autocorrelated(0.3));
+    let unknown = of_causes(vec![], 1e-20, BTreeMap::new(), Basis::Autocorrelated(0.3, ErrorsAtRest::Autocorrelated));
     assert!(unknown.is_unlisted() && unknown.probability == 1.0 && unknown.z > 9.0);
     let mut findings = [found(5.0, &[SLIP]), found(20.0, &[CASTOR]), found(40.0, &[SLIP]), unknown];
     doubt(&mut findings, false);
@@ -370,7 +371,7 @@ fn turns_that_scatter_three_times_as_plainly_take_a_mean_effect_for_a_part_of_th
     assert_eq!(findings[0].doubts, [Doubt::ProbablyPartOfUnlisted]);
     assert!(findings[1].doubts.is_empty() && findings[2] == scatter);
     // What has no mean is doubted below three times, and never put behind; at three times it is not.
-    let unknown = of_causes(vec![], 1e-20, BTreeMap::new(), Basis::Autocorrelated(0.3));
+    let unknown = of_causes(vec![], 1e-20, BTreeMap::new(), Basis::Autocorrelated(0.3, ErrorsAtRest::Autocorrelated));
     let weak = |z| Finding { parameters: BTreeMap::new(), ..found(z, &[Cause::Effect("bumps")]) };
     let mut findings = [weak(2.0), weak(3.0 * unknown.z), unknown];
     doubt(&mut findings, true);

@@ -7,6 +7,7 @@ use effects::Covariate;
 use super::*;
 use crate::cause::Cause;
 use crate::check::Check;
+use crate::errors_at_rest::ErrorsAtRest;
 use crate::finding::of_causes;
 use crate::fit_cache::FitCache;
 use crate::residual_tests::{Checked, Outliers};
@@ -92,7 +93,7 @@ fn faults_come_first_and_then_what_is_most_significant() {
     let ids: Vec<&str> = all.iter().map(|finding| finding.first().id()).collect();
     assert_eq!(ids, ["swapped_wheels", "backlash", "slip_speed"]);
     // Parts of stronger findings are sought behind the faults alone.
-    let unknown = of_causes(vec![], 1e-200, BTreeMap::new(), Basis::Autocorrelated(0.3));
+    let unknown = of_causes(vec![], 1e-200, BTreeMap::new(), Basis::Autocorrelated(0.3, ErrorsAtRest::Autocorrelated));
     let doubted = doubt_parts_of_stronger_findings(&of, vec![first[0].clone(), mean("slip_speed", 5.0), unknown]);
     assert!(doubted[0].doubts.is_empty() && !doubted[1].doubts.is_empty());
 }
@@ -143,7 +144,7 @@ fn failed_checks_are_reported_where_nothing_explains_them() {
     assert!(reported(1e-6, vec![], &[]) && reported(1e-6, vec![mean("slip_speed", 9.0)], &[]));
     // Noise explains a dependence, unless that is too plain; what is in no catalogue explains all.
     assert!(!reported(1e-6, vec![scatters(5.0)], &[]) && reported(1e-9, vec![scatters(5.0)], &[]));
-    let unknown = of_causes(vec![], 1e-9, BTreeMap::new(), Basis::Autocorrelated(0.3));
+    let unknown = of_causes(vec![], 1e-9, BTreeMap::new(), Basis::Autocorrelated(0.3, ErrorsAtRest::Autocorrelated));
     assert!(!reported(1e-9, vec![unknown], &[]));
     // So do counts that are restored roughly, and not every fault.
     assert!(
@@ -157,7 +158,7 @@ fn what_is_left_beside_a_plainer_effect_is_said_once() {
     let structure = structure(&datasets, &[]);
     let left = |doubts: Vec<Doubt>, z: f64| {
         let checks = of_causes(vec![], 1e-9, BTreeMap::new(), Basis::FailedTests(vec![Check::RunToRun]));
-        let tails = of_causes(vec![], 1e-9, BTreeMap::new(), Basis::Autocorrelated(0.3));
+        let tails = of_causes(vec![], 1e-9, BTreeMap::new(), Basis::Autocorrelated(0.3, ErrorsAtRest::Autocorrelated));
         let all = vec![Finding { doubts, ..mean("slip_speed", 9.0) }, Finding { z, ..checks }, tails];
         without_what_doubts_say(&results(&datasets, &structure), all).len()
     };
@@ -247,7 +248,7 @@ fn another_robots_geometry_is_said_once_and_doubts_what_was_found_beside_it() {
 fn stamps_that_were_set_right_roughly_leave_what_has_no_name() {
     let datasets = [session(0, 0.0)];
     let structure = structure(&datasets, &[]);
-    let unknown = || of_causes(vec![], 1e-9, BTreeMap::new(), Basis::Autocorrelated(0.3));
+    let unknown = || of_causes(vec![], 1e-9, BTreeMap::new(), Basis::Autocorrelated(0.3, ErrorsAtRest::Autocorrelated));
     let of_stamps = |share: f64| {
         let value = crate::document::Value { value: share, sigma: Some(0.01), unit: "1".to_owned() };
         Finding { parameters: BTreeMap::from([("share".to_owned(), value)]), ..mean("interval_error", 9.0) }

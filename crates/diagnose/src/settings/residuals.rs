@@ -19,6 +19,14 @@ pub(crate) const RESIMULATED_LEVEL: f64 = 0.01;
 /// Derived: the lag-one coefficient of so many is known to 0.18.
 pub(crate) const MIN_POSES_AT_REST: usize = 30;
 
+/// How many rates of decay errors at rest are compared with, each half of the one before.
+/// Derived: the slowest lasts a hundred times as long as the autocorrelation of the residuals says at least.
+pub(crate) const DECAYS_AT_REST: i32 = 8;
+
+/// Number. Poses of a standstill that are compared with each other; a longer one counts as several.
+/// Budgeted: a correlation of so many is factored in a millisecond.
+pub(crate) const MAX_POSES_OF_STANDSTILL: usize = 128;
+
 /// Seconds before and after a pose in which no wheel turns, for the robot to stand.
 /// Budgeted: what an instrument is late by, or lags, in published logs.
 pub(crate) const REST_MARGIN_S: f64 = 0.3;

@@ -3,6 +3,7 @@
 use super::*;
 use crate::check::Component;
 use crate::document::Compared;
+use crate::errors_at_rest::ErrorsAtRest;
 use crate::geometry_deviation::GeometryDeviation;
 use effects::Covariate;
 use kinematics::Pose;
@@ -117,8 +118,10 @@ fn every_basis_is_said_with_its_numbers() {
     );
     assert_eq!(of(Basis::RecordFault("swapped".to_owned())), "swapped");
     assert!(of(Basis::IsolatedErrors(3, 200)).starts_with("3 of 200 measurements are isolated"));
-    assert!(of(Basis::Autocorrelated(0.456)).contains("(lag-one coefficient 0.46)"));
-    assert!(of(Basis::AutocorrelatedInMotion(0.456)).contains("(lag-one coefficient 0.46) and not while it stands"));
+    let autocorrelated = |at_rest| of(Basis::Autocorrelated(0.456, at_rest));
+    assert!(autocorrelated(ErrorsAtRest::Autocorrelated).contains("(lag-one coefficient 0.46), and no term"));
+    assert!(autocorrelated(ErrorsAtRest::WhiteOrSlow).contains("it stands too shortly to tell"));
+    assert!(autocorrelated(ErrorsAtRest::White).contains("(lag-one coefficient 0.46) and not while it stands"));
     let errors = [ResidualPersistence::Persistent, ResidualPersistence::Reverting, ResidualPersistence::Undecided];
     let errors = errors.map(|persistence| of(Basis::LargeErrors(persistence)));
     assert!(errors[0].contains("persist") && errors[1].contains("reverts") && errors[2].contains("heavier tails"));
