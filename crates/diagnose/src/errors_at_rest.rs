@@ -4,8 +4,8 @@
 //! wheels that err for a while at a time, as on another floor. While the wheels stand, the instrument errs
 //! alone. Its poses then are compared with white errors and with such as have that lag-one coefficient: a
 //! share of them decays exponentially, the rest is white, and the slower the decay the smaller the share. A
-//! standstill that is short against the decay shows little of it: then nobody can tell. The likelihood is that of normal errors about an unknown pose of each standstill, with their variance profiled
-//! out.
+//! standstill that is short against the decay shows little of it: then nobody can tell. The likelihood is
+//! that of normal errors about an unknown pose of each standstill, with their variance profiled out.
 //! Reference: Patterson & Thompson 1971 (the likelihood of what the means leave).
 
 use std::collections::BTreeMap;

@@ -39,6 +39,7 @@ mod normal_equations;
 mod nuisances;
 mod one_step;
 mod optimizer;
+mod parameter_covariance;
 mod partial_filter;
 mod partial_noise;
 mod partial_observation;

@@ -9,18 +9,17 @@ use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen, Vector3};
 use rayon::prelude::*;
 
 use crate::error::EstimationError;
-use crate::map_distortion::{OwnScatter, added_covariance};
 use crate::model::{Column, Model};
 use crate::noise::NoisePrior;
-use crate::normal_equations::{ClusterRobust, NormalEquations, SchurComplement, free_basis};
+use crate::normal_equations::{NormalEquations, SchurComplement, free_basis};
 use crate::optimizer::{ConvergenceCriterion, FitOptions, InitialValues, Solution, fit_from};
 use crate::pass::{Pass, pass};
 use crate::pass_options::{OutlierGate, PassOptions};
 use crate::records::Records;
 use crate::segment::Segment;
 use crate::settings::{
-    INFORMATION_WEIGHT_RUNS, MAX_AUTOCORRELATION_LAG, MAX_NOMINAL_DEVIATION, MAX_OBSERVABLE_SIGMA, MIN_NAMED_DIRECTION,
-    MIN_OWN_DIRECTION, MIN_RUNS_TO_HOLD_OUT, ROTATED_SENSOR_RAD, WHITENESS_Z,
+    MAX_AUTOCORRELATION_LAG, MAX_NOMINAL_DEVIATION, MAX_OBSERVABLE_SIGMA, MIN_NAMED_DIRECTION, MIN_OWN_DIRECTION,
+    MIN_RUNS_TO_HOLD_OUT, ROTATED_SENSOR_RAD, WHITENESS_Z,
 };
 use crate::stated_wheels::with_stated_wheels;
 use crate::thinning::{Selection, Thinning};
@@ -368,57 +367,6 @@ impl ModelFit<'_> {
         Ok(extended)
     }
 
-    /// Covariance of the free columns: the inverse information, and more of the scatter over runs the more
-    /// there are beyond the parameters (cluster-robust, with the leverage of each run; Liang & Zeger 1986;
-    /// Bell & McCaffrey 2002). Both add like variances that are known from so many runs each. Blocks of a run
-    /// do not count: what one leaves goes on in the next. A stated distortion of the map adds to it. `terms`
-    /// are those of the fit. `None` where rounding is all that there is of it.
-    #[must_use]
-    pub fn covariance(&self, terms: &mut [Box<dyn ModelTerm>]) -> Option<DMatrix<f64>> {
-        let free = self.free_basis();
-        let (_, inverse) = self.solution.information(&self.columns)?.along(&free).solve()?;
-        let runs = &self.solution.pass.runs;
-        let mut along = &inverse + self.map_covariance(&free, &inverse, OwnScatter::NotCounted, terms);
-        if runs.len() > free.ncols() {
-            let clusters = runs.iter().map(|run| run.of(&self.columns).along(&free));
-            let mut robust = ClusterRobust::of(&inverse, clusters).covariance;
-            if let Some(scale) = self.position(Column::GyroScale) {
-                let sigma = self.records.gyro_scale_prior_sigma();
-                // What is known of the scale did not come from the runs, and does not scatter over them.
-                let by_scale = &inverse * free.row(scale).transpose() / sigma;
-                robust += &by_scale * by_scale.transpose();
-            }
-            robust += self.map_covariance(&free, &inverse, OwnScatter::Counted, terms);
-            let spare = (runs.len() - free.ncols()) as f64;
-            along = (robust * spare + along * INFORMATION_WEIGHT_RUNS) / (spare + INFORMATION_WEIGHT_RUNS);
-        }
-        with_variances(&free * along * free.transpose())
-    }
-
-    /// What a stated distortion of the instrument's map adds to the covariance along a basis.
-    fn map_covariance(
-        &self,
-        free: &DMatrix<f64>,
-        inverse: &DMatrix<f64>,
-        own: OwnScatter,
-        terms: &mut [Box<dyn ModelTerm>],
-    ) -> DMatrix<f64> {
-        // Where nothing is determined, there is nothing to add to.
-        let Some(map) = self.records.map.filter(|_| !inverse.is_empty()) else {
-            return DMatrix::zeros(inverse.nrows(), inverse.ncols());
-        };
-        let Solution { model, noise, free_headings, .. } = &self.solution;
-        // The counts are integrated once: they are the same wherever the poses are.
-        let mut kept = None;
-        added_covariance(&self.records, map, own, inverse, |records| {
-            let (gate, by, keep) = (OutlierGate::Off, kept.as_ref(), kept.is_none());
-            let options = PassOptions { gate, keep, by, ..PassOptions::default() };
-            let found = pass(records, &self.selections, model, noise, free_headings, terms, options);
-            kept = kept.take().or(found.cached);
-            found.runs.iter().map(|run| run.of(&self.columns).along(free)).collect()
-        })
-    }
-
     /// Where a column stands among the free ones, in steps and covariances; `None` where it is not free.
     #[must_use]
     pub fn position(&self, column: Column) -> Option<usize> {
@@ -489,11 +437,4 @@ fn geometry_information(matrix: &DMatrix<f64>) -> Matrix3<f64> {
         DMatrix::zeros(3, 3)
     };
     Matrix3::from_iterator((own - rest).iter().copied())
-}
-
-/// A covariance whose variances are numbers and not below 0, as rounding leaves them of information that only
-/// rounding inverts.
-fn with_variances(covariance: DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let is_variance = |variance: &f64| variance.is_finite() && *variance >= 0.0;
-    covariance.diagonal().iter().all(is_variance).then_some(covariance)
 }

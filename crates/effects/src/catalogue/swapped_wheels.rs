@@ -85,7 +85,7 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
     let changed = |wheels: &mut WheelLog| match wheels {
         WheelLog::Ticks(Wheels { left, right }) => std::mem::swap(left, right),
         WheelLog::Angles(Wheels { left, right }) | WheelLog::Speeds(Wheels { left, right }) => {
-            std::mem::swap(left, right)
+            std::mem::swap(left, right);
         }
         WheelLog::Twist { .. } => {}
     };
