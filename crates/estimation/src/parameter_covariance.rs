@@ -66,8 +66,8 @@ impl ModelFit<'_> {
     }
 }
 
-/// How many runs that say as much each their information is worth, Σ tr Aᵢ / Σ tr Aᵢ² with a run's share Aᵢ of
-/// the whole (Kish 1965): where one alone shows a parameter, at most as many as there are parameters.
+/// How many runs that say equally much the runs are worth, Σ tr Aᵢ / Σ tr Aᵢ², with Aᵢ a run's share of the
+/// information (Kish 1965). Where one alone shows a parameter, at most as many as there are parameters.
 fn effective_number(inverse: &DMatrix<f64>, clusters: &[Information]) -> f64 {
     let shares = clusters.iter().map(|cluster| inverse * &cluster.matrix);
     let (sum, squares) =
