@@ -248,7 +248,7 @@ pub(crate) const MAX_NOMINAL_DEVIATION: f64 = 3e-7;
 /// How many runs the inverse information counts as beside those that show the scatter, beyond the parameters.
 /// Tuned: 1 and 3 on logs that share no code with the simulator (tests/diagnosis, seeds 720 to 743) and on
 /// `scenarios/ci.toml`. With 1 lengths of 7, 10 and 21 runs are off by 0.9 to 1.2 standard deviations, root
-/// mean square (0.9 to 1.2 with 3), and the 95 % interval of the wheel separation of ten runs covers it in 88
+/// mean square (0.9 to 1.2 with 3), and the 95 % interval of the wheel separation of ten runs covers it in 84
 /// % (78 % with 3, 70 % by the information alone).
 pub(crate) const INFORMATION_WEIGHT_RUNS: f64 = 1.0;
 
