@@ -1,6 +1,6 @@
 //! What the instrument's errors are while the robot stands.
 //!
-//! Errors that last show in the residuals of a robot that drives, whoever makes them: the instrument, or
+//! Autocorrelated errors show in the residuals of a robot that drives, whoever makes them: the instrument, or
 //! wheels that err for a while at a time, as on another floor. While the wheels stand, the instrument errs
 //! alone. Its poses then are compared with white errors and with such as have that lag-one coefficient: a
 //! share of them decays exponentially, the rest is white, and the slower the decay the smaller the share. A
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_that_last_are_likelier_with_their_coefficient_and_white_ones_without() {
+    fn autocorrelated_errors_are_likelier_with_their_coefficient_and_white_ones_without() {
         let odds = |of: [f64; 2], poses: usize, tried: f64| {
             log_odds_of_white(&standstills(of[0], of[1], poses), tried).expect("errors")
         };

@@ -41,13 +41,13 @@ pub(crate) fn scatter(structure: &MeanStructure<'_>, recorded: &[Dataset], witho
         // The model does not follow the robot at all: that has no name.
         return findings;
     }
-    // Errors that last, with what they are while the robot stands: an instrument errs then, too, unless its
-    // errors go with the place.
-    let lasting = structure
+    // Autocorrelated errors, with what they are while the robot stands: an instrument errs then, too, unless
+    // its errors go with the place.
+    let autocorrelated = structure
         .correlated
         .filter(|(coefficient, _)| *coefficient > 0.0)
         .map(|(coefficient, sigmas)| (coefficient, sigmas, errors_at_rest(recorded, coefficient)));
-    let may_be_motions = lasting.is_some_and(|(.., at_rest)| at_rest != ErrorsAtRest::Autocorrelated);
+    let may_be_motions = autocorrelated.is_some_and(|(.., at_rest)| at_rest != ErrorsAtRest::Autocorrelated);
     let turns = of_turns(structure, without_ids);
     let p_of_dependence = tests.iter().filter(|test| test.shows_dependence());
     let p_of_dependence = p_of_dependence.map(|test| test.p_value).fold(1.0, f64::min);
@@ -65,7 +65,7 @@ pub(crate) fn scatter(structure: &MeanStructure<'_>, recorded: &[Dataset], witho
         let value = Value { value: share, sigma: None, unit: "1".to_owned() };
         let of = outliers.measurements + rejected;
         let mut causes = with_sign(Sign::IsolatedErrors, without_ids);
-        // What errs for a while at a time errs much at times.
+        // Where motions err for a while at a time, some of these errors are large.
         if !causes.is_empty() && may_be_motions {
             causes.push(Cause::Unknown);
         }
@@ -126,7 +126,7 @@ pub(crate) fn scatter(structure: &MeanStructure<'_>, recorded: &[Dataset], witho
             findings.push(finding::of_likely_scatter(likely, any, or_unlisted, p_value, basis));
         }
     }
-    if let Some((coefficient, sigmas, at_rest)) = lasting {
+    if let Some((coefficient, sigmas, at_rest)) = autocorrelated {
         let mut causes = with_sign(Sign::AutocorrelatedErrors, without_ids);
         // Where something else is found too, it may be that this is the rest of it.
         let may_be_rest = structure.spurious || !structure.found.model.candidates.is_empty();

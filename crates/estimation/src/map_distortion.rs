@@ -22,40 +22,62 @@ pub(crate) enum OwnScatter {
     NotCounted,
 }
 
-/// What the distortion adds to the covariance of parameters. `equations` gives the normal equation of each
-/// run with other measured poses, `inverse` is that of the whole information.
-///
-/// Where the scatter over runs is counted, what it has of the map already is taken off ([`of_function`]).
-pub(crate) fn added_covariance(
-    records: &Records<'_>,
-    distortion: MapDistortion,
-    own: OwnScatter,
-    inverse: &DMatrix<f64>,
-    mut equations: impl FnMut(&Records<'_>) -> Vec<Information>,
-) -> DMatrix<f64> {
-    let n = inverse.nrows();
-    let at_rest = equations(records);
-    let mut added = DMatrix::zeros(n, n);
-    let mut shifted = records.clone();
-    let functions = functions(records, distortion.length_m);
-    let sigmas = [distortion.sigma_xy_m, distortion.sigma_xy_m, distortion.sigma_theta_rad];
-    let distorted = (0..sigmas.len()).filter(|coordinate| sigmas[*coordinate] > 0.0);
-    for (coordinate, function) in distorted.flat_map(|coordinate| functions.iter().map(move |of| (coordinate, of))) {
-        shift(&mut shifted, records, coordinate, |place| sigmas[coordinate] * function.at(place));
-        let runs: Vec<Information> = equations(&shifted)
-            .into_iter()
-            .zip(&at_rest)
-            .map(|(moved, rest)| Information { gradient: moved.gradient - &rest.gradient, ..rest.clone() })
+/// How each function of the distortion shifts the runs' gradients.
+pub(crate) struct MapShifts {
+    /// The runs as they were measured.
+    runs: Vec<Information>,
+    /// For each function the shift of each run's gradient.
+    gradients: Vec<Vec<DVector<f64>>>,
+}
+
+impl MapShifts {
+    /// `equations` gives the normal equation of each run with other measured poses.
+    pub(crate) fn of(
+        records: &Records<'_>,
+        distortion: MapDistortion,
+        mut equations: impl FnMut(&Records<'_>) -> Vec<Information>,
+    ) -> Self {
+        let runs = equations(records);
+        let mut shifted = records.clone();
+        let functions = functions(records, distortion.length_m);
+        let sigmas = [distortion.sigma_xy_m, distortion.sigma_xy_m, distortion.sigma_theta_rad];
+        let distorted = (0..sigmas.len()).filter(|coordinate| sigmas[*coordinate] > 0.0);
+        let gradients = distorted
+            .flat_map(|coordinate| functions.iter().map(move |of| (coordinate, of)))
+            .map(|(coordinate, function)| {
+                shift(&mut shifted, records, coordinate, |place| sigmas[coordinate] * function.at(place));
+                equations(&shifted)
+                    .into_iter()
+                    .zip(&runs)
+                    .map(|(moved, rest)| moved.gradient - &rest.gradient)
+                    .collect()
+            })
             .collect();
-        added += of_function(&runs, own, inverse);
+        Self { runs, gradients }
     }
-    let size = inverse.diagonal().map(|variance| variance.max(f64::MIN_POSITIVE).sqrt());
-    // Over the standard deviations: metres, radians and ratios differ by orders of magnitude.
-    let scaled = DMatrix::from_fn(n, n, |i, j| added[(i, j)] / (size[i] * size[j]));
-    let mut eigen = scaled.symmetric_eigen();
-    eigen.eigenvalues.apply(|value| *value = value.max(0.0));
-    let positive = eigen.recompose();
-    DMatrix::from_fn(n, n, |i, j| positive[(i, j)] * size[i] * size[j])
+
+    /// What the distortion adds to the covariance of parameters; `inverse` is that of the whole information.
+    ///
+    /// Where the scatter over runs is counted, what it has of the map already is taken off ([`of_function`]).
+    pub(crate) fn added_covariance(&self, own: OwnScatter, inverse: &DMatrix<f64>) -> DMatrix<f64> {
+        let n = inverse.nrows();
+        let mut added = DMatrix::zeros(n, n);
+        for gradients in &self.gradients {
+            let of_run = |(gradient, run): (&DVector<f64>, &Information)| Information {
+                gradient: gradient.clone(),
+                matrix: run.matrix.clone(),
+            };
+            let runs: Vec<Information> = gradients.iter().zip(&self.runs).map(of_run).collect();
+            added += of_function(&runs, own, inverse);
+        }
+        let size = inverse.diagonal().map(|variance| variance.max(f64::MIN_POSITIVE).sqrt());
+        // Over the standard deviations: metres, radians and ratios differ by orders of magnitude.
+        let scaled = DMatrix::from_fn(n, n, |i, j| added[(i, j)] / (size[i] * size[j]));
+        let mut eigen = scaled.symmetric_eigen();
+        eigen.eigenvalues.apply(|value| *value = value.max(0.0));
+        let positive = eigen.recompose();
+        DMatrix::from_fn(n, n, |i, j| positive[(i, j)] * size[i] * size[j])
+    }
 }
 
 /// What one function adds, by the shift g of each run's gradient.

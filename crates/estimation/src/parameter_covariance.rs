@@ -3,7 +3,7 @@
 use model_term::ModelTerm;
 use nalgebra::DMatrix;
 
-use crate::map_distortion::{OwnScatter, added_covariance};
+use crate::map_distortion::{MapShifts, OwnScatter};
 use crate::model::Column;
 use crate::model_fit::ModelFit;
 use crate::normal_equations::{ClusterRobust, Information};
@@ -17,14 +17,20 @@ impl ModelFit<'_> {
     /// there are beyond the parameters (cluster-robust, with the leverage of each run; Liang & Zeger 1986;
     /// Bell & McCaffrey 2002). Both add like variances that are known from so many runs each. A run that
     /// alone shows a parameter says nothing of its scatter; blocks of a run do not count, as what one leaves
-    /// goes on in the next. A stated distortion of the map adds to it. `terms`
-    /// are those of the fit. `None` where rounding is all that there is of it.
+    /// goes on in the next. A stated distortion of the map adds to it. `terms` are those of the fit. `None`
+    /// where rounding is all that there is of it.
     #[must_use]
     pub fn covariance(&self, terms: &mut [Box<dyn ModelTerm>]) -> Option<DMatrix<f64>> {
         let free = self.free_basis();
         let (_, inverse) = self.solution.information(&self.columns)?.along(&free).solve()?;
         let runs = &self.solution.pass.runs;
-        let mut along = &inverse + self.map_covariance(&free, &inverse, OwnScatter::NotCounted, terms);
+        // Where nothing is determined, a map has nothing to add to.
+        let map = if inverse.is_empty() { None } else { self.map_shifts(&free, terms) };
+        let beside_map = |covariance: DMatrix<f64>, own| match &map {
+            Some(map) => covariance + map.added_covariance(own, &inverse),
+            None => covariance,
+        };
+        let mut along = beside_map(inverse.clone(), OwnScatter::NotCounted);
         let clusters: Vec<Information> = runs.iter().map(|run| run.of(&self.columns).along(&free)).collect();
         let spare = effective_number(&inverse, &clusters) - free.ncols() as f64;
         if spare > 0.0 {
@@ -35,34 +41,25 @@ impl ModelFit<'_> {
                 let by_scale = &inverse * free.row(scale).transpose() / sigma;
                 robust += &by_scale * by_scale.transpose();
             }
-            robust += self.map_covariance(&free, &inverse, OwnScatter::Counted, terms);
+            robust = beside_map(robust, OwnScatter::Counted);
             along = (robust * spare + along * INFORMATION_WEIGHT_RUNS) / (spare + INFORMATION_WEIGHT_RUNS);
         }
         with_variances(&free * along * free.transpose())
     }
 
-    /// What a stated distortion of the instrument's map adds to the covariance along a basis.
-    fn map_covariance(
-        &self,
-        free: &DMatrix<f64>,
-        inverse: &DMatrix<f64>,
-        own: OwnScatter,
-        terms: &mut [Box<dyn ModelTerm>],
-    ) -> DMatrix<f64> {
-        // Where nothing is determined, there is nothing to add to.
-        let Some(map) = self.records.map.filter(|_| !inverse.is_empty()) else {
-            return DMatrix::zeros(inverse.nrows(), inverse.ncols());
-        };
+    /// How a stated distortion of the instrument's map shifts the runs' gradients along a basis; `None` where
+    /// none is stated.
+    fn map_shifts(&self, free: &DMatrix<f64>, terms: &mut [Box<dyn ModelTerm>]) -> Option<MapShifts> {
         let Solution { model, noise, free_headings, .. } = &self.solution;
         // The counts are integrated once: they are the same wherever the poses are.
         let mut kept = None;
-        added_covariance(&self.records, map, own, inverse, |records| {
+        Some(MapShifts::of(&self.records, self.records.map?, |records| {
             let (gate, by, keep) = (OutlierGate::Off, kept.as_ref(), kept.is_none());
             let options = PassOptions { gate, keep, by, ..PassOptions::default() };
             let found = pass(records, &self.selections, model, noise, free_headings, terms, options);
             kept = kept.take().or(found.cached);
             found.runs.iter().map(|run| run.of(&self.columns).along(free)).collect()
-        })
+        }))
     }
 }
 

@@ -3,7 +3,7 @@
 use dataset::{MapDistortion, TruthSample, WheelLog};
 use nalgebra::{DMatrix, DVector};
 
-use crate::map_distortion::{OwnScatter, added_covariance};
+use crate::map_distortion::{MapShifts, OwnScatter};
 use crate::{FitSettings, Information};
 
 /// Poses of SLAM of a robot that stands: no direction of its geometry is determined.
@@ -44,7 +44,8 @@ fn a_map_moves_an_estimate_of_one_place_by_what_it_is_distorted_by_there() {
         let gradient = DVector::from_row_slice(&[place.x_m, place.y_m, place.theta_rad.expect("measured")]);
         vec![Information { matrix: DMatrix::zeros(3, 3), gradient }]
     };
-    let added = added_covariance(&records, distortion, OwnScatter::NotCounted, &inverse, of_place);
+    let shifts = MapShifts::of(&records, distortion, of_place);
+    let added = shifts.added_covariance(OwnScatter::NotCounted, &inverse);
     let shift = DMatrix::from_diagonal(&DVector::from_row_slice(&[
         sigma_xy_m * sigma_xy_m,
         sigma_xy_m * sigma_xy_m,
