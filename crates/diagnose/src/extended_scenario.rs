@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use dataset::{Dataset, NominalRobot, Protocol, WheelLog};
+use dataset::{Dataset, NominalRobot, Protocol};
 use effects::{
     Covariate, Effect, PhysicalEffect, Quantization, Sparse, SparseTerm, WheelMismatch, WheelScale, Wheelbase,
     effect_from_estimates,
@@ -16,6 +16,7 @@ use crate::augmented_model::AugmentedModel;
 use crate::candidate::Candidate;
 use crate::record_faults::Fault;
 use crate::settings::findings::{MIN_CONTROLLER_COUNTS, STANDING_READING_INTERVAL_S};
+use crate::settings::plan::DEFAULT_SPEED_M_S;
 use crate::stamp_errors::StampError;
 
 /// Motors and controllers of YAIR stand in for those of a robot that a dataset does not describe: what is
@@ -160,37 +161,22 @@ fn geometry(model: &AugmentedModel<'_>) -> Result<[Effect; 3], String> {
 /// How fast and how often.
 pub(crate) struct SamplingStatistics {
     pub(crate) speed_m_s: f64,
+    /// `None` where the log has no start from rest.
+    pub(crate) acceleration_m_s2: Option<f64>,
     pub(crate) between_rows_s: f64,
     pub(crate) between_measurements_s: f64,
 }
 
 impl SamplingStatistics {
     pub(crate) fn of(datasets: &[Dataset], model: &AugmentedModel<'_>) -> Self {
-        let mut rows: Vec<f64> = Vec::new();
-        let mut speeds: Vec<f64> = Vec::new();
-        for dataset in datasets {
-            let Ok(geometry) = dataset.robot.geometry() else { continue };
-            for run in &dataset.runs {
-                rows.extend(run.odometry.t_s.windows(2).map(|pair| pair[1] - pair[0]));
-                let m_per_count = match &run.odometry.wheels {
-                    WheelLog::Ticks(_) => {
-                        dataset.robot.ticks_per_rev.and_then(|ticks| geometry.m_per_count(ticks).ok())
-                    }
-                    _ => None,
-                };
-                if let (WheelLog::Ticks(ticks), Some(m_per_count)) = (&run.odometry.wheels, m_per_count) {
-                    let steps = ticks.right.windows(2).zip(run.odometry.t_s.windows(2));
-                    speeds.extend(
-                        steps.map(|(of, t)| ((of[1] - of[0]) as f64 * m_per_count.right / (t[1] - t[0])).abs()),
-                    );
-                }
-            }
-        }
-        speeds.retain(|speed| *speed > 0.01);
+        let runs = datasets.iter().flat_map(|dataset| &dataset.runs);
+        let mut rows: Vec<f64> =
+            runs.flat_map(|run| run.odometry.t_s.windows(2).map(|pair| pair[1] - pair[0])).collect();
         let mut measurements: Vec<f64> = model.fit.records.times_between().collect();
+        let driven = model.fit.records.drive_statistics(&model.fit.solution.model);
         Self {
-            // Cruising is the upper end of the speeds: starts and stops are slower.
-            speed_m_s: quantile(&mut speeds, 0.75).unwrap_or(0.25).clamp(0.01, 5.0),
+            speed_m_s: driven.map_or(DEFAULT_SPEED_M_S, |driven| driven.cruise_speed_m_s).clamp(0.01, 5.0),
+            acceleration_m_s2: driven.and_then(|driven| driven.acceleration_m_s2),
             between_rows_s: quantile(&mut rows, 0.5).unwrap_or(10.0).clamp(1e-3, 1e3),
             between_measurements_s: quantile(&mut measurements, 0.5).unwrap_or(10.0).clamp(1e-2, 1e3),
         }

@@ -19,6 +19,7 @@ mod covariances;
 mod dead_reckoned_ends;
 mod decimation;
 mod derivatives;
+mod drive_statistics;
 mod error;
 mod filter;
 mod filter_state;
@@ -74,6 +75,7 @@ mod wheel_angles;
 mod wheel_rates;
 
 pub use dead_reckoned_ends::EndError;
+pub use drive_statistics::DriveStatistics;
 pub use error::{EstimationError, WrappedCounter, refuse_wrapped_counters};
 pub use innovation::InnovationComponent;
 pub use kinematic_samples::KinematicSample;

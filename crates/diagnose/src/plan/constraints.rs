@@ -78,7 +78,7 @@ impl Setting {
         Some(Self {
             robot: first.robot,
             top_speed_m_s: limits.top_speed_m_s.unwrap_or(sampling.speed_m_s),
-            acceleration_m_s2: DEFAULT_ACCELERATION_M_S2,
+            acceleration_m_s2: sampling.acceleration_m_s2.unwrap_or(DEFAULT_ACCELERATION_M_S2),
             between_rows_s: sampling.between_rows_s,
             reading,
             sees_heading: !runs().any(|run| run.truth.iter().any(|sample| sample.theta_rad().is_none())),

@@ -46,7 +46,7 @@ pub(super) fn discriminate(
     let id = |k: usize| rivals.rival_columns[k].candidate.id();
 
     let search = |rivals| DiscriminationSearch { rivals, before: &before, options: &options, setting };
-    // What tells them as likely as not is worth driving where nothing tells them for certain.
+    // What discriminates them as likely as not is worth driving where nothing does for certain.
     let searches =
         both.iter().chain([&rivals]).flat_map(|rivals| [(rivals, Confidence::P95), (rivals, Confidence::P50)]);
     let plan = searches.into_iter().find_map(|(rivals, confidence)| search(rivals).plan(confidence));
@@ -73,7 +73,7 @@ pub(super) fn discriminate(
     let (tells, still) = if never.is_empty() {
         (listed(&names), String::new())
     } else {
-        (pairs(&discriminated), format!(" It does not tell {}.", pairs(&never)))
+        (pairs(&discriminated), format!(" It does not discriminate {}.", pairs(&never)))
     };
     let tell = if confidence == Confidence::P95 { "discriminates" } else { "discriminates, at even odds," };
     let why = format!(
@@ -121,8 +121,8 @@ struct DiscriminationSearch<'a> {
 impl DiscriminationSearch<'_> {
     /// For certain, what takes the least time; else what discriminates them best within the time.
     fn plan(&self, confidence: Confidence) -> Option<Discrimination> {
-        // A pair that nothing discriminates, however long it is driven, must not hide what tells the others
-        // apart.
+        // A pair that nothing discriminates, however long it is driven, must not hide what discriminates the
+        // others.
         let tellable: Vec<Pair> = self
             .rivals
             .pairs()
@@ -156,7 +156,7 @@ impl DiscriminationSearch<'_> {
                 .map(|discrimination| discrimination.sigmas);
             Some((option.0, worst.min_by(f64::total_cmp)?))
         });
-        let what = format!("nothing that can be driven {} tells {} apart", self.setting.within, listed(names));
+        let what = format!("nothing that can be driven {} discriminates {}", self.setting.within, listed(names));
         match best.max_by(|a, b| a.1.total_cmp(&b.1)) {
             Some((manoeuvre, sigmas)) => format!(
                 "{what}: the best, {}, leaves them {sigmas:.1} standard deviations from each other",
@@ -211,7 +211,7 @@ impl DiscriminationSearch<'_> {
         kinds.iter().map(|(manoeuvre, _)| manoeuvre.cost(self.setting).minutes).sum()
     }
 
-    /// The least number of pairs of runs of each of some kinds that tells all given pairs of names apart.
+    /// The least number of pairs of runs of each of some kinds that discriminates all given pairs of names.
     fn least_pairs(&self, names: &[Pair], kinds: &[&Driven], confidence: Confidence, within_min: f64) -> Option<u32> {
         let most = self.most_pairs(kinds, within_min);
         // More runs can make a name whose form is not known well enough harder to drop: the margin is not
@@ -224,12 +224,10 @@ impl DiscriminationSearch<'_> {
         (parts, f64::from(pairs) * self.minutes(kinds))
     }
 
-    /// Every two kinds at one speed.
+    /// Every two kinds of run; one kind at two speeds is two.
     fn twos(&self) -> impl Iterator<Item = [&Driven; 2]> {
-        self.options.iter().enumerate().flat_map(|(k, first)| {
-            let at_its_speed = |second: &&Driven| second.0.speed_m_s == first.0.speed_m_s;
-            self.options[k + 1..].iter().filter(at_its_speed).map(move |second| [first, second])
-        })
+        let firsts = self.options.iter().enumerate();
+        firsts.flat_map(|(k, first)| self.options[k + 1..].iter().map(move |second| [first, second]))
     }
 
     /// The kind of run, or two kinds at one speed, that takes the least time.

@@ -193,6 +193,10 @@ pub(crate) fn planned_run(
     let log = log(program, setting, speed_m_s, phase_rad)?;
     let end_s = *log.t_s.last()?;
     let times: Vec<f64> = match (measurements, setting.reading) {
+        (Measurements::At(shares), Reading::Even(_)) => {
+            // At rows: between rows that come rarely a pose is known too badly to be used.
+            std::iter::once(0.0).chain(shares.iter().map(|share| nearest(&log.t_s, share * end_s))).collect()
+        }
         (Measurements::At(shares), _) => std::iter::once(0.0).chain(shares.iter().map(|share| share * end_s)).collect(),
         (Measurements::AsSoFar, Reading::AtEnds) => vec![0.0, end_s],
         (Measurements::AsSoFar, Reading::Standing) => log.read_s.iter().map(|read_s| read_s.min(end_s)).collect(),
@@ -222,6 +226,13 @@ pub(crate) fn planned_run(
     let wheels = if setting.twist { twist(&log, setting)? } else { WheelLog::Angles(log.angle_rad) };
     run.odometry = Odometry { t_s: log.t_s.into(), wheels, ..Odometry::default() };
     Some(run)
+}
+
+/// The instant of the row that is nearest to another instant.
+fn nearest(rows_s: &[f64], t_s: f64) -> f64 {
+    let after = rows_s.partition_point(|row_s| *row_s < t_s).clamp(1, rows_s.len() - 1);
+    let (before_s, after_s) = (rows_s[after - 1], rows_s[after]);
+    if t_s - before_s < after_s - t_s { before_s } else { after_s }
 }
 
 /// The instrument's poses at some instants.

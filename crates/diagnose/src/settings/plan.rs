@@ -1,5 +1,9 @@
 //! The next experiment.
 
+/// m/s. Speed where the log has none.
+/// Convention: that of the shipped YAIR robot.
+pub(crate) const DEFAULT_SPEED_M_S: f64 = 0.25;
+
 /// m/s². Acceleration of a wheel where nothing is known of it.
 /// Convention: that of the shipped YAIR robot.
 pub(crate) const DEFAULT_ACCELERATION_M_S2: f64 = 0.5;

@@ -4,12 +4,14 @@
 //! `Budgeted:` is a share of an error, of time or of memory that is allowed. `Tuned:` is found by trial, on
 //! what it says. `Convention:` is customary. `Published:` names author, year and equation.
 
+mod driving;
 mod map;
 mod partial;
 mod poses_between_rows;
 mod start_headings;
 mod thinning;
 
+pub(crate) use driving::{CRUISE_QUANTILE, RISE_QUANTILE, RISE_SPEED_RATIOS};
 pub(crate) use map::{
     GOLDEN_ANGLE_RAD, MAP_CELLS_PER_LENGTH, MAP_WAVES, MAX_MAP_CELLS, MAX_MAP_FUNCTIONS, MAX_MAP_REMAINDER,
 };

@@ -171,9 +171,10 @@ fn an_instrument_measures_at_its_intervals_and_at_the_end() {
     let sparse = Setting { reading: Reading::Even(1.3), ..setting.clone() };
     let times = run_of(&sparse, straight, Measurements::AsSoFar).truth.iter().map(|of| of.t_s).collect::<Vec<_>>();
     assert!(times.len() == 4 && (times[2] - 2.6).abs() < 1e-9, "{times:?}");
-    let at = run_of(&setting, straight, Measurements::At(&[0.5, 1.0]));
+    // Where it is looked at, at the nearest row: poses between rows so long are known too badly to be used.
+    let at = run_of(&setting, straight, Measurements::At(&[0.46, 1.0]));
     let times: Vec<f64> = at.truth.iter().map(|of| of.t_s).collect();
-    assert!((times[1] - 1.8).abs() < 1e-9 && (times[2] - 3.6).abs() < 1e-9, "{times:?}");
+    assert!((times[1] - 1.6).abs() < 1e-9 && (times[2] - 3.6).abs() < 1e-9, "{times:?}");
     // Half of the distance after half a second and half of what it takes.
     let half =
         &run_of(&Setting { between_rows_s: 0.01, ..setting }, straight, Measurements::At(&[1.75 / 3.51])).truth[1];
