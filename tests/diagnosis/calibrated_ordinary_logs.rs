@@ -5,6 +5,7 @@
 //! The campaign: `YAIR_ROBOTS=40 cargo test --release --test diagnosis calibrated -- --nocapture`.
 #![allow(clippy::print_stdout)] // every kind with its errors
 
+use std::fs;
 use std::path::Path;
 use std::process::Command;
 
@@ -119,11 +120,35 @@ fn a_clock_of_another_rate_is_refused_with_what_mends_it() {
         let mends: f64 = mends.split(' ').next().and_then(|text| text.parse().ok()).expect("a factor");
         assert!((mends - factor).abs() < 3e-5, "{mends} for {factor}");
         let manifest = folder.path().join("dataset.toml");
-        let text = std::fs::read_to_string(&manifest).expect("a manifest");
+        let text = fs::read_to_string(&manifest).expect("a manifest");
         let corrected = format!("[corrections]\ntruth_time_factor = {mends:?}\n[robot]");
-        std::fs::write(&manifest, text.replace("[robot]", &corrected)).expect("written");
+        fs::write(&manifest, text.replace("[robot]", &corrected)).expect("written");
         let found = calibrated(folder.path(), truth_m);
         // The factor is known to some 1e-5, a seventh of what wheels are.
         assert!(!found.is_refused && found.z.iter().all(|z| z.abs() < 4.5), "{:?} {}", found.z, found.said);
+    }
+}
+
+/// Of the logs whose rows are sent some at a time these do not converge as they are stamped.
+#[test]
+fn rows_that_are_sent_some_at_a_time_are_calibrated_once_they_are_corrected_as_check_says() {
+    for seed in [971, 978, 979] {
+        let mut robot = PlainRobot::ordinary(seed);
+        robot.rows_per_packet = 5;
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let truth_m = robot.write(folder.path());
+        let mut command = Command::new(env!("CARGO_BIN_EXE_yair"));
+        let checked = command.args(["check", "--json"]).arg(folder.path()).output().expect("it runs");
+        let document: Value = serde_json::from_slice(&checked.stdout).expect("a document");
+        let problems = document["problems"].as_array().expect("problems");
+        let found = problems.iter().find(|problem| problem["id"] == "rows_in_packets").expect("it is said");
+        let fix = found["fix"].as_str().expect("a remedy");
+        let key = fix.strip_prefix("[corrections] ").expect("a key of the table");
+        let file = folder.path().join("dataset.toml");
+        let text = fs::read_to_string(&file).expect("a manifest");
+        fs::write(&file, format!("{text}\n[corrections]\n{key}\n")).expect("it is written");
+        let Calibrated { is_refused, said, z } = calibrated(folder.path(), truth_m);
+        // Nine errors: one beyond five standard deviations has a chance of 5e-6.
+        assert!(!is_refused && z.len() == 3 && z.iter().all(|z| z.abs() < 5.0), "{seed}: {said} {z:?}");
     }
 }

@@ -6,6 +6,7 @@ use serde::Deserialize;
 
 use crate::partial::HeadingReading;
 use crate::pose_covariance::PoseCovariance;
+use crate::read_times::read_times_s;
 use crate::record::{Run, TruthSample, WheelLog};
 
 /// Corrections of all runs; none by default.
@@ -32,6 +33,8 @@ pub(crate) struct Corrections {
     reverse_right_wheel: bool,
     /// Rates are of a row's instant, not of the interval that ends there.
     instant_rates: bool,
+    /// Rows that are sent some at a time are stamped when they were read.
+    restore_read_times: bool,
 }
 
 impl Default for Corrections {
@@ -51,6 +54,7 @@ impl Default for Corrections {
             reverse_left_wheel: false,
             reverse_right_wheel: false,
             instant_rates: false,
+            restore_read_times: false,
         }
     }
 }
@@ -67,6 +71,11 @@ impl Corrections {
             return;
         }
         run.odometry.t_s.iter_mut().for_each(|t_s| *t_s *= self.time_factor);
+        if self.restore_read_times
+            && let Some(read_s) = read_times_s(&run.odometry.t_s)
+        {
+            run.odometry.t_s = read_s.into();
+        }
         self.wheels(&run.odometry.t_s, &mut run.odometry.wheels);
         run.gyro.iter_mut().for_each(|sample| sample.t_s *= self.time_factor);
         run.map_measurement_times(|t_s| *t_s = *t_s * self.time_factor * self.truth_time_factor + self.truth_shift_s);
@@ -206,6 +215,25 @@ mod tests {
         run.odometry.wheels = WheelLog::Twist { v_mps: vec![1.0, 3.0], omega_radps: vec![0.0, 0.5] };
         Corrections { instant_rates: true, ..Corrections::default() }.apply(&mut run);
         assert_eq!(run.odometry.wheels, WheelLog::Twist { v_mps: vec![1.0, 2.0], omega_radps: vec![0.0, 0.25] });
+    }
+
+    #[test]
+    fn rows_that_are_sent_five_at_a_time_are_stamped_when_they_were_read() {
+        // Of a long log the beat is found; a short one has the mean gap of its packets.
+        for rows in [200, 50] {
+            let read_s: Vec<f64> = (0..rows).map(|row| 0.01 * f64::from(row)).collect();
+            // With the last of its packet, 0.1 ms after each other.
+            let sent = |row: i32| 0.01 * f64::from(row / 5 * 5 + 4) + 1e-4 * f64::from(row % 5 - 4);
+            let [mut bunched, mut even] = [run(), run()];
+            bunched.odometry.t_s = (0..rows).map(sent).collect::<Vec<f64>>().into();
+            even.odometry.t_s = read_s.clone().into();
+            let corrections = Corrections { restore_read_times: true, ..Corrections::default() };
+            for mut run in [bunched, even] {
+                corrections.apply(&mut run);
+                let off = run.odometry.t_s.iter().zip(&read_s).map(|(t_s, read_s)| (t_s - read_s).abs());
+                assert!(off.fold(0.0, f64::max) < 1e-9, "{:?}", run.odometry.t_s);
+            }
+        }
     }
 
     #[test]

@@ -19,6 +19,13 @@ pub(crate) const ACCEPTED_BITS: std::ops::RangeInclusive<u8> = 2..=63;
 /// and nearly 2ⁿ.
 const BELIEVED_SHRINKAGE: u64 = 4;
 
+/// An unwrapped jump may be so many times larger than any of the increments beside it: that many rows may be
+/// lost there. A counter that is set to 0 near 2ⁿ leaves more.
+const BELIEVED_RATIO: u64 = 10;
+
+/// How many increments count on each side of a jump: a robot may stand before it.
+const STEPS_BESIDE: usize = 3;
+
 /// An increment modulo 2^bits, in [−2^(bits−1), 2^(bits−1)).
 fn wrapped(increment: i64, bits: u8) -> i64 {
     let unused = 64 - u32::from(bits);
@@ -40,11 +47,12 @@ pub(crate) fn unwrap(ticks: &mut [i64], bits: u8) {
 /// one.
 ///
 /// They do when they span less than 2ⁿ counts, some increment exceeds 2ⁿ⁻¹, such increments are at most half
-/// of all, and unwrapping makes the largest increment at least four times smaller. Two rows alone show
-/// nothing: a run that was read at its ends only may have made any number of counts.
+/// of all, and unwrapping makes the largest increment at least four times smaller, and at most ten times as
+/// large as those beside it. Two rows alone show nothing: a run that was read at its ends only may have made
+/// any number of counts.
 #[must_use]
 pub fn suspected_wrap(ticks: &[i64]) -> Option<u8> {
-    width_of_jumps(ticks).filter(|_| spike(ticks).is_none())
+    width_of_jumps(ticks).filter(|bits| jumps_are_usual_steps(ticks, *bits) && spike(ticks).is_none())
 }
 
 /// The row at which a counter leaves its place, as far as a wrap would, and comes back in the next row, if
@@ -69,6 +77,18 @@ fn width_of_jumps(ticks: &[i64]) -> Option<u8> {
         let jumps = increments().filter(|increment| increment.unsigned_abs() > half_turn).count();
         let unwrapped = increments().map(|increment| wrapped(increment, bits).unsigned_abs()).max();
         2 * jumps < ticks.len() && unwrapped.is_some_and(|unwrapped| BELIEVED_SHRINKAGE * unwrapped <= largest)
+    })
+}
+
+/// Whether the jumps of a counter of some width are, unwrapped, like the increments beside them.
+fn jumps_are_usual_steps(ticks: &[i64], bits: u8) -> bool {
+    let increment = |row: usize| ticks[row + 1].wrapping_sub(ticks[row]);
+    let rows = ticks.len().saturating_sub(1);
+    let step = |row: usize| wrapped(increment(row), bits).unsigned_abs();
+    (0..rows).filter(|&row| increment(row).unsigned_abs() > 1 << (bits - 1)).all(|jump| {
+        let beside = jump.saturating_sub(STEPS_BESIDE)..rows.min(jump + STEPS_BESIDE + 1);
+        let usual = beside.filter(|&row| row != jump).map(step).max().unwrap_or(0);
+        step(jump) <= BELIEVED_RATIO.saturating_mul(usual)
     })
 }
 
@@ -202,5 +222,8 @@ mod tests {
         // Wider than the counter.
         assert_eq!(suspected_wrap(&[0, 10, 70_000, 4_470, 4_480]), None);
         assert_eq!(suspected_wrap(&[65_500, 65_520, 4, 24]), Some(16));
+        // Set to 0 at 62000: unwrapped, a leap of 3556 is left among steps of 20.
+        assert_eq!(suspected_wrap(&[62_000, 62_020, 40, 60]), None);
+        assert_eq!(suspected_wrap(&[62_000, 62_020, 40, 620]), Some(16));
     }
 }

@@ -53,6 +53,12 @@ impl Packets {
     }
 }
 
+/// How many rows come at a time, where a log's rows are kept and sent in packets; by stamps that do not fall.
+#[must_use]
+pub fn rows_per_packet(t_s: &[f64]) -> Option<usize> {
+    Packets::of(t_s).map(|packets| packets.rows)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -103,6 +109,7 @@ mod tests {
             before_s = (PERIOD_S * f64::from(row) - 0.02 * draws.uniform().ln()).max(before_s + 1e-4);
             before_s
         };
+        assert_eq!(rows_per_packet(&stamps_s(&sent_by(5))), Some(5));
         assert!(Packets::of(&(0..2000).map(received).collect::<Vec<f64>>()).is_none());
         assert!(Packets::of(&(0..2000).map(|row| PERIOD_S * f64::from(row)).collect::<Vec<f64>>()).is_none());
     }

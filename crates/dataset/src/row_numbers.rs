@@ -9,17 +9,42 @@ const PATHS: usize = 8;
 const MEMORY_ROWS: f64 = 200.0;
 /// Rows whose middle one says how late rows usually are, at first.
 const FIRST_ROWS: usize = 9;
-/// Log odds against a lost row, against each further one with it, and against a pause however long: rows are
-/// lost a few in a thousand, several together more often than independently.
-const LOST_COST: f64 = 8.0;
+/// Log odds against each further row that is lost with another, and against a pause however long: several
+/// rows are lost together more often than independently.
 const FURTHER_LOST_COST: f64 = 2.0;
 const PAUSE_COST: f64 = 14.0;
-/// The same against a row that came by itself.
-const BY_ITSELF_COST: f64 = 10.0;
+/// Least log odds against a row that is lost or came by itself, where they are taken from their shares: of
+/// one in fifty.
+const MIN_COST: f64 = 4.0;
 /// Deviations beyond which an error costs in proportion to its size (Huber 1964).
 const HUBER_SIGMAS: f64 = 1.5;
 /// Share of the beat by which stamps are held to jitter at the least: what rounded file formats leave.
 const MIN_JITTER: f64 = 0.02;
+
+/// Log odds against what happens to single rows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct RowCosts {
+    /// Against a lost row.
+    lost: f64,
+    /// Against a row that came by itself.
+    by_itself: f64,
+}
+
+impl RowCosts {
+    /// Before anything is known of a log: a few rows in a thousand are lost, and fewer came by themselves.
+    pub(crate) const UNKNOWN: Self = Self { lost: 8.0, by_itself: 10.0 };
+
+    /// Of a log whose rows have these numbers, as far as they are lower.
+    pub(crate) fn of(numbers: &[i64]) -> Self {
+        let steps = || numbers.windows(2).map(|pair| pair[1] - pair[0]);
+        let of_share =
+            |count: usize, unknown: f64| (numbers.len() as f64 / count.max(1) as f64).ln().clamp(MIN_COST, unknown);
+        Self {
+            lost: of_share(steps().filter(|step| *step > 1).count(), Self::UNKNOWN.lost),
+            by_itself: of_share(steps().filter(|step| *step == 0).count(), Self::UNKNOWN.by_itself),
+        }
+    }
+}
 
 /// One way to number the rows so far.
 #[derive(Debug, Clone, Copy)]
@@ -57,10 +82,10 @@ fn huber(deviation: f64) -> f64 {
 }
 
 /// Cost of a step by so many ticks.
-fn step_cost(ticks: i64) -> f64 {
+fn step_cost(ticks: i64, costs: RowCosts) -> f64 {
     match ticks {
         ..=1 => 0.0,
-        _ => (LOST_COST + FURTHER_LOST_COST * (ticks - 2) as f64).min(PAUSE_COST),
+        _ => (costs.lost + FURTHER_LOST_COST * (ticks - 2) as f64).min(PAUSE_COST),
     }
 }
 
@@ -74,7 +99,7 @@ fn jitter(t_s: &[f64], period_s: f64) -> f64 {
 
 /// The numbers by the likeliest path, and its cost: that of one beat over another one's counts the densities
 /// of lateness in seconds, or the beat by which stamps jitter most were always the likeliest.
-pub(crate) fn likeliest_numbers(t_s: &[f64], period_s: f64) -> (Vec<i64>, f64) {
+pub(crate) fn likeliest_numbers(t_s: &[f64], period_s: f64, costs: RowCosts) -> (Vec<i64>, f64) {
     let at = |row: usize| (t_s[row] - t_s[0]) / period_s;
     let jitter = jitter(t_s, period_s);
     // The first row may be late itself.
@@ -90,13 +115,13 @@ pub(crate) fn likeliest_numbers(t_s: &[f64], period_s: f64) -> (Vec<i64>, f64) {
             for number in [path.number + 1, due.floor() as i64, due.ceil() as i64] {
                 if number > path.number {
                     let late = at(row) - number as f64 - path.usual;
-                    let cost = path.cost + step_cost(number - path.number) + huber(late / jitter);
+                    let cost = path.cost + step_cost(number - path.number, costs) + huber(late / jitter);
                     let learnt = late.clamp(-2.0 * jitter, 2.0 * jitter) / MEMORY_ROWS.min(row as f64 + 1.0);
                     offer(Path { number, cost, usual: path.usual + learnt, from });
                 }
             }
             // A row that came by itself is of no tick, and as late as it likes.
-            offer(Path { cost: path.cost + BY_ITSELF_COST, from, ..path.to_owned() });
+            offer(Path { cost: path.cost + costs.by_itself, from, ..path.to_owned() });
             // The beat begins anew, as after a pause that is no whole number of ticks.
             let number = path.number + 1;
             offer(Path { number, cost: path.cost + PAUSE_COST, usual: at(row) - number as f64, from });

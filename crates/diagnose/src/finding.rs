@@ -27,6 +27,7 @@ use crate::settings::findings::{
 use crate::settings::levels::{
     LOW_SIGNIFICANCE_SIGMAS, MIN_LOG_ODDS_MARGIN, MIN_QUANTILE_P_VALUE, MODEL_MISMATCH_FRACTION,
 };
+use crate::settings::records::MAX_WRONG_WHEELS_FACTOR;
 use crate::stamp_errors::StampError;
 use crate::statistics::{p_of_chi_square, sidak, z_of_p};
 use crate::wald::Test;
@@ -315,7 +316,8 @@ pub(crate) fn of_spans(spans: Option<&TestResult>) -> Option<Finding> {
 pub(crate) fn of_wrong_wheels(factor: f64, without: &[String]) -> Option<Finding> {
     let factor_of = |id: &'static str| effects::description(id)?.record_fault.counts_factor.map(|size| (id, size));
     let (id, size) = CATALOGUE.iter().copied().find_map(factor_of)?;
-    let cause = if without.iter().any(|out| out == id) { Cause::Unknown } else { Cause::Effect(id) };
+    let is_nameable = factor.ln().abs() <= MAX_WRONG_WHEELS_FACTOR.ln() && without.iter().all(|out| out != id);
+    let cause = if is_nameable { Cause::Effect(id) } else { Cause::Unknown };
     // Logged over true counts: wheels that count twice as often seem half as large.
     let value = Value { value: factor.recip(), sigma: None, unit: "1".to_owned() };
     Some(of_causes(vec![cause], 0.0, BTreeMap::from([(size.to_owned(), value)]), Basis::WheelFactor(factor)))

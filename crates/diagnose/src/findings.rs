@@ -180,9 +180,13 @@ fn faults_of_the_log(results: &StageResults<'_, '_>, mut findings: Vec<Finding>)
         if results.uncorrelated { Vec::new() } else { remaining_deviations(&structure.base, structure.model()) };
     // Another robot's counts say more than another robot's wheels.
     deviations.retain(|deviation| wheels.is_none() || deviation.of != GeometryRatio::Wheels);
-    // An effect that is found beside another robot's geometry may be what the geometry is wrong by.
+    // An effect that is found beside another robot's geometry may be what the geometry is wrong by, and
+    // errors that are autocorrelated may be what the wheels of another robot leave.
     if wheels.is_some() || deviations.iter().any(|deviation| !deviation.is_of_skid_steering()) {
-        for finding in findings.iter_mut().filter(|finding| finding.is_certain()) {
+        let is_autocorrelated = |finding: &Finding| matches!(finding.basis, Basis::Autocorrelated(..));
+        let may_be_rest =
+            |finding: &&mut Finding| finding.is_certain() || (is_autocorrelated(finding) && !finding.has_unlisted());
+        for finding in findings.iter_mut().filter(may_be_rest) {
             finding.or_unlisted(1.0, Doubt::OtherGeometry);
         }
     }

@@ -59,6 +59,7 @@ mod residual_tests;
 mod residuals;
 mod rivals;
 mod run_to_run;
+mod same_measurements;
 mod scan;
 mod selection;
 mod settings;

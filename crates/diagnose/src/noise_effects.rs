@@ -129,7 +129,7 @@ pub(crate) fn scatter(structure: &MeanStructure<'_>, recorded: &[Dataset], witho
     if let Some((coefficient, sigmas, at_rest)) = autocorrelated {
         let mut causes = with_sign(Sign::AutocorrelatedErrors, without_ids);
         // Where something else is found too, it may be that this is the rest of it.
-        let may_be_rest = structure.spurious || !structure.found.model.candidates.is_empty();
+        let may_be_rest = structure.spurious || !structure.found.model.candidates.is_empty() || turns.is_some();
         if at_rest == ErrorsAtRest::White {
             causes.insert(0, Cause::Unknown);
         } else if !causes.is_empty() && (may_be_rest || at_rest == ErrorsAtRest::WhiteOrSlow) {

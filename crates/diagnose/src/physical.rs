@@ -18,6 +18,7 @@ pub(crate) fn is_physical(extended: &AugmentedModel<'_>, index: usize) -> bool {
         let effect = effect.physical();
         scatters_enough(extended, effect.scatter_of_contact_m())
             && (!effect.needs_row_lengths() || extended.fit.records.go_by_row_lengths())
+            && (!effect.needs_distances() || extended.fit.records.has_distances())
     };
     effect_of(candidate, &test.estimates).is_some_and(is_possible)
 }

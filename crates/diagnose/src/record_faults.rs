@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use crate::augmented_model::{cost, count};
 use crate::candidate::{Candidate, terms};
 use crate::model_comparison::log_odds_margin;
+use crate::same_measurements::with_same_measurements;
 use crate::settings::levels::SENSOR_HEADING_PRIOR_SIGMA_RAD;
 use crate::settings::records::{
     FACTOR_TOLERANCE, LOG_ODDS_OF_A_MISTAKE, MAX_CORRECTED_OUTLIER_FRACTION, MAX_CORRELATED_WHEEL_SIGMA,
@@ -115,11 +116,12 @@ fn explained_by(
         if !is_plausible && !visible_in_log {
             return None;
         }
-        // Measurements that only one fit explains are outliers to the other; one without a cost is no base.
-        let measurements = base.map_or(0.0, count).max(count(&fit));
-        let cost_of = |fit: &ModelFit<'_>| Some(cost(fit, measurements) + implausible(fit)).filter(|of| of.is_finite());
-        let own = cost_of(&fit)?;
-        let gain = base.and_then(cost_of).map_or(f64::MAX, |before| before - own);
+        let same = base.and_then(|base| with_same_measurements((datasets, base), (&compared, &fit)));
+        let fits = same.as_ref().map(|same| same.each_ref().map(|of| PLAIN.fit_to_compare(&sessions(of)).ok()));
+        let gain = match &fits {
+            Some([before, after]) => gain(before.as_ref(), after.as_ref()?)?,
+            None => gain(base, &fit)?,
+        };
         let gain = gain - f64::from(mistakes - 1) * LOG_ODDS_OF_A_MISTAKE;
         // What the log shows needs no instrument; one must not contradict it, where it has anything to say.
         let min_gain = match visible_in_log {
@@ -127,11 +129,21 @@ fn explained_by(
             true => -MIN_FAULT_LOG_LIKELIHOOD_GAIN,
             false => MIN_FAULT_LOG_LIKELIHOOD_GAIN,
         };
+        drop(fits);
         drop(fit);
         drop(compared);
         (gain > min_gain).then_some((visible_in_log, Fault { id, rivals: Vec::new(), values, sentence, records, gain }))
     };
     batched(datasets, corrections).into_iter().filter_map(explains).collect()
+}
+
+/// Log of how much likelier a fit is than the one before it; `None` where it has no likelihood.
+fn gain(before: Option<&ModelFit<'_>>, after: &ModelFit<'_>) -> Option<f64> {
+    // Measurements that only one fit explains are outliers to the other; one without a cost is no base.
+    let measurements = before.map_or(0.0, count).max(count(after));
+    let cost_of = |fit: &ModelFit<'_>| Some(cost(fit, measurements) + implausible(fit)).filter(|of| of.is_finite());
+    let own = cost_of(after)?;
+    Some(before.and_then(cost_of).map_or(f64::MAX, |before| before - own))
 }
 
 /// The faults that undo as much as the best one, each with its log odds against that. What the log shows by

@@ -192,7 +192,8 @@ fn basis(finding: &Finding) -> String {
             "the log lasts {ratio:.3e} times as long as what was measured of the robot: their times are not in one unit"
         ),
         Basis::WheelFactor(factor) => format!(
-            "calibrated wheels are {factor:.2} times as large as the robot's description says: it, its counts or their units are another robot's"
+            "calibrated wheels are {} times as large as the robot's description says: it, its counts or their units are another robot's",
+            as_ratio(*factor)
         ),
         Basis::Geometry(deviation) => {
             let (what, stated) = match deviation.of {
@@ -208,7 +209,7 @@ fn basis(finding: &Finding) -> String {
                 true => "as of a robot that skids in turns, or the description is another robot's",
                 false => "the description is another robot's, or the fit is of something else",
             };
-            format!("{what} {:.2} times {stated}: {why}", deviation.ratio)
+            format!("{what} {} times {stated}: {why}", as_ratio(deviation.ratio))
         }
         Basis::ClockOffset(offset_s) => {
             let whose = match finding.runs.as_deref() {
@@ -321,6 +322,11 @@ pub(crate) fn summary(findings: &[Finding], gain: Option<&Gain>) -> String {
         }
         Verdict::Unlisted => format!("found, and not all of it is in the catalogue: {}{gains}", names.join(", ")),
     }
+}
+
+/// A ratio to two digits after the point, or, where that is nothing, to two digits.
+fn as_ratio(ratio: f64) -> String {
+    if (0.1..1e3).contains(&ratio) { format!("{ratio:.2}") } else { format!("{ratio:.1e}") }
 }
 
 #[cfg(test)]

@@ -138,6 +138,11 @@ pub trait PhysicalEffect {
         false
     }
 
+    /// Whether only records can show it that have distances from elsewhere than the instrument's map.
+    fn needs_distances(&self) -> bool {
+        false
+    }
+
     /// The effect of sizes that the blind benchmark drew, in force at a scale in a robot, where that is
     /// another than [`Self::from_estimates`] makes of them.
     fn at_scale(values: &[ParameterValue], scale: f64, robot: &HostRobot) -> Option<Self>

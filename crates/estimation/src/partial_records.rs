@@ -57,6 +57,11 @@ impl PartialSegment<'_> {
         most
     }
 
+    /// Are distances measured in it?
+    pub(crate) fn has_distances(&self) -> bool {
+        self.observations.iter().any(|of| matches!(of.quantity, Quantity::Distance | Quantity::WallDistance(_)))
+    }
+
     /// Does a gyroscope measure in it?
     pub(crate) fn has_gyro(&self) -> bool {
         self.observations.iter().any(|of| matches!(of.quantity, Quantity::GyroTurn { .. }))

@@ -134,6 +134,13 @@ impl<'a> Records<'a> {
         self.partial.iter().any(PartialSegment::has_gyro)
     }
 
+    /// Are distances measured in some run by tape or from walls, which owe nothing to the map that poses are
+    /// in?
+    #[must_use]
+    pub fn has_distances(&self) -> bool {
+        self.partial.iter().any(PartialSegment::has_distances)
+    }
+
     /// Standard deviation of the gyroscope's relative scale, before it is seen.
     pub(crate) fn gyro_scale_prior_sigma(&self) -> f64 {
         self.gyro_scale_sigma.unwrap_or(GYRO_SCALE_SIGMA)

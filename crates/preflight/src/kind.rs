@@ -49,6 +49,8 @@ pub(crate) enum Kind {
     InstantRates,
     /// A gap within a log.
     Gap { t_s: f64, length_s: f64 },
+    /// Rows are sent so many at a time.
+    RowsInPackets { rows: usize },
     /// Rows are missing.
     LostRows { share: f64 },
     /// Too little was driven.

@@ -31,6 +31,7 @@ pub(crate) const fn id(kind: &Kind) -> &'static str {
         Kind::TruthOutlier { .. } => "truth_outlier",
         Kind::InstantRates => "instant_rates",
         Kind::Gap { .. } => "log_gap",
+        Kind::RowsInPackets { .. } => "rows_in_packets",
         Kind::LostRows { .. } => "lost_rows",
         Kind::TooShort { .. } => "too_short",
         Kind::OneWayTurns { .. } => "one_way_turns",
@@ -146,25 +147,32 @@ pub(crate) fn sentence(kind: &Kind, runs: Option<&[String]>) -> String {
         Kind::CounterSpike { side, t_s, count, rows } => {
             let more = if *rows > 1 { format!(", as in {} more rows", rows - 1) } else { String::new() };
             format!(
-                "the {} counter shows {count} at t = {t_s} s and comes back in the next row{more}; delete such rows",
-                side.name()
+                "the {} counter shows {count} at t = {} s and comes back in the next row{more}; delete such rows",
+                side.name(),
+                to_ms(*t_s)
             )
         }
         Kind::CounterRestart { side, t_s } => format!(
-            "the {} counter starts again from 0 at t = {t_s} s; cut the run there into two runs",
-            side.name()
+            "the {} counter starts again from 0 at t = {} s; cut the run there into two runs",
+            side.name(),
+            to_ms(*t_s)
         ),
         Kind::TruthOutlier { t_s, distance_m, rows } => {
             let more = if *rows > 1 { format!(", and {} more rows likewise", rows - 1) } else { String::new() };
             format!(
-                "the truth jumps by {distance_m:.3e} m at t = {t_s} s and comes back{more}; delete such rows"
+                "the truth jumps by {distance_m:.3e} m at t = {} s and comes back{more}; delete such rows",
+                to_ms(*t_s)
             )
         }
         Kind::InstantRates => {
             "v_mps and omega_radps are of the instant; a row's rates are to be those of the interval that ends there; average each row with the one before".to_owned()
         }
         Kind::Gap { t_s, length_s } => format!(
-            "the log has a gap of {length_s:.2} s after t = {t_s} s; say continuous = false under its [[run]], or cut it there"
+            "the log has a gap of {length_s:.2} s after t = {} s; say continuous = false under its [[run]], or cut it there",
+            to_ms(*t_s)
+        ),
+        Kind::RowsInPackets { rows } => format!(
+            "the log's rows are sent {rows} at a time and stamped on receipt: their times do not say when the wheels were read"
         ),
         Kind::LostRows { share } => format!("{:.0} % of the log's rows are missing", 100.0 * share),
         Kind::TooShort { distance_m } => format!(
@@ -212,6 +220,11 @@ fn ticks_per_rev(stated: Option<f64>, ratio: f64) -> Option<f64> {
     stated.map(|stated| (stated / ratio).round()).filter(|ticks| (1.0..f64::MAX).contains(ticks))
 }
 
+/// An instant, seconds, to a millisecond.
+fn to_ms(t_s: f64) -> f64 {
+    (1e3 * t_s).round() / 1e3
+}
+
 /// At most so many runs are named one by one.
 fn place(runs: Option<&[String]>) -> String {
     match runs {
@@ -252,6 +265,7 @@ pub(crate) fn fix(kind: &Kind) -> Option<String> {
         Kind::TicksPerTurn { ratio, stated, .. } => {
             ticks_per_rev(*stated, *ratio).map(|ticks| format!("[robot] ticks_per_rev = {ticks:.0}"))
         }
+        Kind::RowsInPackets { .. } => corrections("restore_read_times = true".to_owned()),
         Kind::InstantRates => corrections("instant_rates = true".to_owned()),
         Kind::Gap { .. } => Some("[[run]] continuous = false".to_owned()),
         Kind::SeveralRobots { .. } => Some("--force".to_owned()),

@@ -266,6 +266,9 @@ fn wheels_that_seem_twice_as_large_count_half_as_often() {
     let without = of_wrong_wheels(2.0, &["wrong_counts_per_turn".to_owned()]).expect("the same");
     assert_eq!(without.causes, [Cause::Unknown]);
     assert_eq!(of_wrong_wheels(2.0, &["slope".to_owned()]).expect("the same").causes, found.causes);
+    // Millimetres for metres, and wheels that no units explain.
+    assert_eq!(of_wrong_wheels(1e3, &[]).expect("the same").causes, found.causes);
+    assert_eq!(of_wrong_wheels(2e-4, &[]).expect("the same").causes, [Cause::Unknown]);
 }
 
 #[test]

@@ -176,6 +176,11 @@ pub(crate) const MAX_SENSOR_HEADING_RAD: f64 = 1.0;
 /// Tuned: by hand; no record of what on.
 pub(crate) const WRONG_WHEELS_FACTOR: f64 = 1.3;
 
+/// Ratio. Wheels that differ by more are not another robot's, nor in other units: the fit is of something
+/// else.
+/// Derived: millimetres for metres are 1000, and wheels of another robot up to twice as large or small.
+pub(crate) const MAX_WRONG_WHEELS_FACTOR: f64 = 2000.0;
+
 /// Relative. Corrections of two sessions undo the same fault if their factors differ by no more.
 /// Tuned: by hand; no record of what on.
 pub(crate) const FACTOR_TOLERANCE: f64 = 0.05;

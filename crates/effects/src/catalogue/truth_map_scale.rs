@@ -67,6 +67,10 @@ impl PhysicalEffect for TruthMapScale {
     fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
         Some(Self { scale_error: value_of(values, "scale_error")? })
     }
+
+    fn needs_distances(&self) -> bool {
+        true
+    }
 }
 
 struct State {

@@ -56,6 +56,14 @@ fn runs_that_say_nothing_are_unused() {
     assert_eq!(records.unused, [(0, 0), (0, 1), (0, 2), (0, 3)]);
     assert!(!records.is_partial() && !records.has_partial() && !records.has_gyro() && !records.is_gyro_scale_stated());
     assert_eq!(records.measurements(), 0);
+    // Tape and the distance from a wall are distances; the heading along a wall is none.
+    let measured = |add: &dyn Fn(&mut Run, &[Pose])| {
+        let dataset = partial::dataset(partial::NO_GYRO, add);
+        Records::of(&[dataset.session()]).has_distances()
+    };
+    assert!(measured(&|run, poses| partial::tape(run, poses, [0, 3], 0.0)));
+    assert!(measured(&|run, poses| partial::wall(run, poses, 3, [true, false], 0.0)));
+    assert!(!measured(&|run, poses| partial::wall(run, poses, 3, [false, true], 0.0)));
 }
 
 #[test]

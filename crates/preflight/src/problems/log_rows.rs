@@ -1,6 +1,6 @@
-//! Gaps and missing rows of the log.
+//! Gaps and missing rows of the log, and rows that are sent some at a time.
 
-use dataset::has_bunched_rows;
+use dataset::{has_bunched_rows, rows_per_packet};
 
 use crate::kind::Kind;
 use crate::problem::{Problem, Severity};
@@ -12,6 +12,7 @@ pub(crate) fn found(check: &mut SessionCheck) {
     let mut problems = Vec::new();
     let mut losing = Vec::new();
     let mut most = 0.0_f64;
+    let mut in_packets: Vec<(String, usize)> = Vec::new();
     for run in &check.runs {
         let Some(median_s) = median_row_s(run) else { continue };
         let lengths = || run.t_s.windows(2).map(|pair| pair[1] - pair[0]).enumerate();
@@ -28,6 +29,7 @@ pub(crate) fn found(check: &mut SessionCheck) {
         }
         // One row that is received late makes a gap, and hardly any distance to the rows that it held up.
         if has_bunched_rows(&run.t_s) {
+            in_packets.extend(rows_per_packet(&run.t_s).map(|rows| (run.id.clone(), rows)));
             continue;
         }
         let missing: f64 = lengths()
@@ -41,6 +43,10 @@ pub(crate) fn found(check: &mut SessionCheck) {
             losing.push(run.id.clone());
             most = most.max(share);
         }
+    }
+    if let Some(rows) = in_packets.iter().map(|(_, rows)| *rows).max() {
+        let runs = in_packets.into_iter().map(|(id, _)| id).collect();
+        problems.push(Problem::new(&Kind::RowsInPackets { rows }, Severity::Warning, Some(runs), 0.95));
     }
     if !losing.is_empty() {
         problems.push(Problem::new(&Kind::LostRows { share: most }, Severity::Hint, Some(losing), 0.9));
