@@ -4,8 +4,6 @@
 //! A factor on both wheels does not change the likelihood, which fits any geometry; the prior of the
 //! geometry decides. A fault that the fit absorbs is worse than none.
 
-use std::borrow::Cow;
-
 use dataset::{Dataset, Session};
 use effects::{CATALOGUE, Hypothesis, RecordCorrection, hypothesis};
 use estimation::{Column, FitSettings, ModelFit, NoiseComponent};
@@ -14,7 +12,7 @@ use rayon::prelude::*;
 use crate::augmented_model::{cost, count};
 use crate::candidate::{Candidate, terms};
 use crate::model_comparison::log_odds_margin;
-use crate::same_measurements::with_same_measurements;
+use crate::same_measurements::{with_same_measurements, with_unknown_motion_of};
 use crate::settings::levels::SENSOR_HEADING_PRIOR_SIGMA_RAD;
 use crate::settings::records::{
     FACTOR_TOLERANCE, LOG_ODDS_OF_A_MISTAKE, MAX_CORRECTED_OUTLIER_FRACTION, MAX_CORRELATED_WHEEL_SIGMA,
@@ -160,22 +158,6 @@ fn rivals(tried: &[(&'static str, bool, f64)], visible: bool, best: &Fault) -> V
     rivals.retain(|(_, odds)| *odds >= -log_odds_margin(best.gain));
     rivals.sort_by(|a, b| b.1.total_cmp(&a.1));
     rivals
-}
-
-/// Records whose motion is unknown where that of others is.
-fn with_unknown_motion_of<'r>(of: &[Dataset], records: &'r [Dataset]) -> Cow<'r, [Dataset]> {
-    let spans = |datasets: &'_ [Dataset]| -> Vec<_> {
-        datasets.iter().flat_map(|dataset| &dataset.runs).map(|run| run.unknown_motion.clone()).collect()
-    };
-    if spans(of) == spans(records) {
-        return Cow::Borrowed(records);
-    }
-    let mut records = records.to_vec();
-    let runs = records.iter_mut().flat_map(|dataset| &mut dataset.runs);
-    for (run, other) in runs.zip(of.iter().flat_map(|dataset| &dataset.runs)) {
-        run.unknown_motion.clone_from(&other.unknown_motion);
-    }
-    Cow::Owned(records)
 }
 
 /// How implausible the geometry parameters of a fit are, as a part of its cost.
@@ -498,15 +480,5 @@ mod tests {
         assert!(without.is_none_or(|other| other.id != "swapped_wheels"));
         // Without a base fit any correction that makes a drive is a fault.
         assert_eq!(fault(&swapped, None, &[], false).map(|of| of.id), Some("swapped_wheels"));
-    }
-
-    #[test]
-    fn records_get_the_unknown_motion_of_others() {
-        use dataset::UnknownMotion;
-        let (sound, mut other) = ([session(0, 0.0)], [session(0, 0.0)]);
-        assert!(matches!(with_unknown_motion_of(&sound, &other), Cow::Borrowed(_)));
-        other[0].runs[3].add_unknown_motion([UnknownMotion { from_s: 1.0, to_s: 2.0 }]);
-        let with = with_unknown_motion_of(&other, &sound);
-        assert!(with[0].runs[3].is_motion_unknown(1.0, 2.0) && !with[0].runs[2].is_motion_unknown(1.0, 2.0));
     }
 }

@@ -1,8 +1,10 @@
 //! Two versions of some records with the measurements that fits of both take.
 //!
 //! Which poses between rows a fit takes depends on the rows ([`estimation::Records`]): counts that are
-//! restored may say less of what lies between them. Costs compare where they are of the same measurements.
+//! restored may say less of what lies between them. Costs compare where they are of the same measurements,
+//! and are not compared where motions are unknown.
 
+use std::borrow::Cow;
 use std::collections::HashSet;
 
 use dataset::Dataset;
@@ -44,6 +46,22 @@ fn instants(fit: &ModelFit<'_>) -> HashSet<Instant> {
     fit.records.segments.iter().enumerate().flat_map(of_segment).collect()
 }
 
+/// Records whose motion is unknown where that of others is.
+pub(crate) fn with_unknown_motion_of<'r>(of: &[Dataset], records: &'r [Dataset]) -> Cow<'r, [Dataset]> {
+    let spans = |datasets: &'_ [Dataset]| -> Vec<_> {
+        datasets.iter().flat_map(|dataset| &dataset.runs).map(|run| run.unknown_motion.clone()).collect()
+    };
+    if spans(of) == spans(records) {
+        return Cow::Borrowed(records);
+    }
+    let mut records = records.to_vec();
+    let runs = records.iter_mut().flat_map(|dataset| &mut dataset.runs);
+    for (run, other) in runs.zip(of.iter().flat_map(|dataset| &dataset.runs)) {
+        run.unknown_motion.clone_from(&other.unknown_motion);
+    }
+    Cow::Owned(records)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -64,5 +82,15 @@ mod tests {
         assert_eq!((lengths(&first), lengths(&second)), (expected.clone(), expected));
         assert_eq!(first[0].runs[2].truth, fewer[0].runs[2].truth);
         assert!(with_same_measurements((&whole, &of_whole), (&whole, &of_whole)).is_none());
+    }
+
+    #[test]
+    fn records_get_the_unknown_motion_of_others() {
+        use dataset::UnknownMotion;
+        let (sound, mut other) = ([session(0, 0.0)], [session(0, 0.0)]);
+        assert!(matches!(with_unknown_motion_of(&sound, &other), Cow::Borrowed(_)));
+        other[0].runs[3].add_unknown_motion([UnknownMotion { from_s: 1.0, to_s: 2.0 }]);
+        let with = with_unknown_motion_of(&other, &sound);
+        assert!(with[0].runs[3].is_motion_unknown(1.0, 2.0) && !with[0].runs[2].is_motion_unknown(1.0, 2.0));
     }
 }
