@@ -1,6 +1,8 @@
 //! Gaps of a log's rows, and whether the counts of the missing rows were lost with them: gap by gap where the
 //! rows beside it tell, by all of the others together where they do not.
 
+use std::ops::Range;
+
 use dataset::{Odometry, Run, Timestamps, WheelLog};
 use kinematics::{Side, Wheels};
 
@@ -9,6 +11,11 @@ use crate::hypothesis::median;
 /// Where rows are too few to have a beat: an interval longer than the usual one by this factor is nearer to
 /// two of them. It may be a gap, or a pause of the log, and the counts tell.
 const GAP_RATIO: f64 = 1.5;
+/// Share of the most counts of a row that one that was held up beside it shows at the least. One that came by
+/// itself shows what its length says: anything.
+const MIN_WHOLE_ROW: f64 = 0.75;
+/// Rows to either side of a gap among which those are that it holds up.
+const HELD_UP_ROWS: usize = 4;
 /// Counts that what both wheels show, over a row or a gap, may be off by as they are rounded: one of each.
 const MAX_ROUNDING: f64 = 2.0;
 /// Variance of a difference of two counts that are each rounded, counts².
@@ -249,6 +256,20 @@ fn variance_of_due(rates: &[Vec<f64>; 2], rows: f64, row_s: f64) -> f64 {
     rows * of_row.max(0.0) * (1.0 + rows / count) + rows * rows * between.max(0.0) / 12.0 + of_rounding
 }
 
+/// Whether a gap is of a row that was received late, with as many rows on its heels as it is too long by: by
+/// their numbers some near it came by themselves, but each shows a whole row's counts.
+fn holds_rows_up(gap: usize, rows: &[f64], shown: &Wheels<Vec<f64>>) -> bool {
+    let counts = |row: usize| shown.left[row].abs() + shown.right[row].abs();
+    let are_whole = |near: &Range<usize>| {
+        let most = near.clone().map(counts).fold(0.0, f64::max);
+        near.clone().all(|row| counts(row) >= MIN_WHOLE_ROW * most)
+    };
+    let is_even = |near: &Range<usize>| rows[near.clone()].iter().sum::<f64>() <= near.len() as f64;
+    let ends = gap + 1..=(gap + 1 + HELD_UP_ROWS).min(rows.len());
+    let mut near = ends.flat_map(|end| (gap.saturating_sub(HELD_UP_ROWS)..=gap).rev().map(move |first| first..end));
+    near.any(|near| is_even(&near) && are_whole(&near))
+}
+
 /// The gaps of a run over which its wheels turned, and what they say of missing rows.
 pub(super) fn gaps(run: &Run) -> (Vec<Gap>, Missing) {
     let mut missing = Missing::default();
@@ -279,6 +300,9 @@ pub(super) fn gaps(run: &Run) -> (Vec<Gap>, Missing) {
         });
         let shown_of_both = shown.left[k].abs() + shown.right[k].abs();
         if due == Wheels::both(0.0) && shown_of_both == 0.0 {
+            continue;
+        }
+        if holds_rows_up(k, &rows, &shown) {
             continue;
         }
         let beside = |row: &usize| Beside {
@@ -362,5 +386,32 @@ mod tests {
         assert_eq!(all.short_gaps(), ShortGaps::Lost);
         assert_eq!(none.short_gaps(), ShortGaps::AsTheyAre);
         assert!(all.is_visible() && !none.is_visible() && !half.is_visible());
+    }
+
+    /// One of the rows is received 45 ms late, and the next one at once behind it; another is lost with its
+    /// counts, and a third one with a row of its own behind it, a third of a row after it.
+    #[test]
+    fn regress_a_row_that_holds_up_the_next_is_no_lost_one() {
+        let (mut t_s, mut ticks, mut count) = (vec![], vec![], 0);
+        for row in 0..200 {
+            count += 40;
+            if row == 100 || row == 150 {
+                count -= 40;
+                continue;
+            }
+            let late_s = if row == 50 { 0.045 } else { 0.0 };
+            let at_s = 0.03 * f64::from(row) + 1e-3 * f64::from(row * row % 7);
+            t_s.push(f64::max(at_s + late_s, t_s.last().map_or(0.0, |before: &f64| before + 1e-4)));
+            ticks.push(count);
+            if row == 151 {
+                t_s.push(at_s + 0.01);
+                ticks.push(count + 13);
+            }
+        }
+        let wheels = WheelLog::Ticks(Wheels { left: ticks.clone(), right: ticks });
+        let run = Run { odometry: Odometry { t_s: t_s.into(), wheels, ..Odometry::default() }, ..Run::default() };
+        let (gaps, missing) = gaps(&run);
+        assert_eq!((missing.lost, missing.kept, gaps.len()), (2, 0, 2), "{gaps:?}");
+        assert!(gaps.iter().all(|gap| gap.row > 90), "{gaps:?}");
     }
 }
