@@ -23,7 +23,7 @@ pub(crate) struct Packets {
 
 impl Packets {
     /// By stamps that do not fall; `None` where rows do not come in packets.
-    pub(crate) fn of(t_s: &[f64]) -> Option<Self> {
+    fn of(t_s: &[f64]) -> Option<Self> {
         let (_, on_heels) = rows_on_heels(t_s)?;
         let firsts: Vec<usize> = (0..t_s.len()).filter(|row| !on_heels[*row]).collect();
         let ends = firsts[1..].iter().copied().chain([t_s.len()]);
@@ -35,14 +35,22 @@ impl Packets {
         (rows >= MIN_ROWS && whole as f64 >= MIN_USUAL_SHARE * inner as f64).then_some(Self { of, rows })
     }
 
+    /// When rows were read that are sent some at a time, by the beat that is found of the packets' own stamps:
+    /// their period, and what each of them is late by. `None` of any other log.
+    pub(crate) fn read(t_s: &[f64], beat_of: impl FnOnce(&[f64]) -> Option<(f64, Vec<f64>)>) -> Option<Received> {
+        let packets = Self::of(t_s)?;
+        let (period_s, late_s) = beat_of(&packets.sent_s(t_s))?;
+        packets.rows_read(t_s, (period_s, &late_s))
+    }
+
     /// When each was sent: the stamps of the last rows.
-    pub(crate) fn sent_s(&self, t_s: &[f64]) -> Vec<f64> {
+    fn sent_s(&self, t_s: &[f64]) -> Vec<f64> {
         self.of.iter().map(|packet| t_s[packet.end - 1]).collect()
     }
 
     /// When the rows were read, by the packets' period and what each of them is late by; `None` where one is
     /// longer than usual and reaches into the one before.
-    pub(crate) fn rows_read(&self, t_s: &[f64], (sent_period_s, sent_late_s): (f64, &[f64])) -> Option<Received> {
+    fn rows_read(&self, t_s: &[f64], (sent_period_s, sent_late_s): (f64, &[f64])) -> Option<Received> {
         let period_s = sent_period_s / self.rows as f64;
         let of_packet = |(packet, late_s): (&Range<usize>, &f64)| {
             let sent_s = t_s[packet.end - 1] - late_s;
@@ -89,6 +97,7 @@ mod tests {
             sent.drain(..1);
             let lost = 20 * rows as usize - 1;
             sent.remove(lost);
+            assert_eq!(rows_per_packet(&stamps_s(&sent)), Some(rows as usize));
             let found = SamplingPeriod::of(&stamps_s(&sent)).expect("packets");
             assert!((found.period_s / PERIOD_S - 1.0).abs() < 1e-3, "{} of {rows}", found.period_s);
             let wrong = sent.iter().zip(&found.late_s).map(|([read_s, stamp_s], late_s)| stamp_s - late_s - read_s);
@@ -109,7 +118,6 @@ mod tests {
             before_s = (PERIOD_S * f64::from(row) - 0.02 * draws.uniform().ln()).max(before_s + 1e-4);
             before_s
         };
-        assert_eq!(rows_per_packet(&stamps_s(&sent_by(5))), Some(5));
         assert!(Packets::of(&(0..2000).map(received).collect::<Vec<f64>>()).is_none());
         assert!(Packets::of(&(0..2000).map(|row| PERIOD_S * f64::from(row)).collect::<Vec<f64>>()).is_none());
     }

@@ -91,7 +91,7 @@ impl SamplingPeriod {
                 off_s: 0.0,
             });
         }
-        let Numbered { period_s, numbers, .. } = match Numbered::by(t_s, gap_s) {
+        let mut found = match Numbered::by(t_s, gap_s) {
             Some(exact) if exact.cost == f64::NEG_INFINITY => exact,
             of_gap => {
                 let mut tried_s = vec![gap_s];
@@ -105,22 +105,21 @@ impl SamplingPeriod {
                 found.settled(t_s)
             }
         };
-        let (mut period_s, mut numbers) = (period_s, numbers);
-        let mut late_s = lateness(t_s, &numbers, period_s);
-        let mut off_s = root_mean_square(&late_s);
+        let mut late_s = found.lateness(t_s);
         for _ in 0..ROUNDS {
-            if off_s <= MAX_CERTAIN_LATENESS * period_s {
+            if root_mean_square(&late_s) <= MAX_CERTAIN_LATENESS * found.period_s {
                 break;
             }
             // As many rows are lost, or came by themselves, as were found, and not as few as is usual.
-            let Some(other) = Numbered::with(t_s, period_s, RowCosts::of(&numbers)) else { break };
-            let other_late_s = lateness(t_s, &other.numbers, other.period_s);
-            let other_off_s = root_mean_square(&other_late_s);
-            if other_off_s >= off_s {
+            let Some(other) = Numbered::with(t_s, found.period_s, RowCosts::of(&found.numbers)) else { break };
+            let other_late_s = other.lateness(t_s);
+            if root_mean_square(&other_late_s) >= root_mean_square(&late_s) {
                 break;
             }
-            (late_s, off_s, period_s, numbers) = (other_late_s, other_off_s, other.period_s, other.numbers);
+            (found, late_s) = (other, other_late_s);
         }
+        let Numbered { period_s, numbers, .. } = found;
+        let off_s = root_mean_square(&late_s);
         // Where stamps jitter by more, rows that share a number need not have come by themselves.
         let of_ticks_s = lateness_of_ticks(&numbers, &late_s);
         let late_s = if root_mean_square(&of_ticks_s) < MAX_JITTER_BESIDE * period_s { of_ticks_s } else { late_s };
@@ -129,9 +128,7 @@ impl SamplingPeriod {
 
     /// When rows were read that are sent some at a time.
     fn of_packets(t_s: &[f64]) -> Option<Received> {
-        let packets = Packets::of(t_s)?;
-        let sent = Self::of(&packets.sent_s(t_s))?;
-        packets.rows_read(t_s, (sent.period_s, &sent.late_s))
+        Packets::read(t_s, |sent_s| Self::of(sent_s).map(|sent| (sent.period_s, sent.late_s)))
     }
 
     /// Whether stamps are near enough to the beat that the numbers of all rows are right.
@@ -216,6 +213,11 @@ impl Numbered {
         let whole = whole_gaps(t_s, first_s).map(|numbers| (numbers, f64::NEG_INFINITY));
         let (numbers, cost) = whole.unwrap_or_else(|| likeliest_numbers(t_s, first_s, costs));
         Some(Self { first_s, period_s: period(t_s, &numbers)?, numbers, cost })
+    }
+
+    /// How late each row is by them, seconds.
+    fn lateness(&self, t_s: &[f64]) -> Vec<f64> {
+        lateness(t_s, &self.numbers, self.period_s)
     }
 
     /// Period and numbers that are found from each other, as long as they get likelier.

@@ -96,9 +96,10 @@ fn weighted_quantile(values: impl Iterator<Item = (f64, f64)>, share: f64) -> Op
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dataset::{Dataset, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, WheelLog};
+    use crate::tests::dataset_of;
+    use dataset::{Dataset, Odometry, Run, RunInfo, TruthSample, WheelLog};
 
-    /// A robot of wheels of 0.1 m that stands, goes straight at 0.4 m/s for seconds and stands again, five
+    /// A robot of wheels of 0.16 m that stands, goes straight at 0.4 m/s for seconds and stands again, five
     /// times, and once at half of that; the first time it is pushed to its speed.
     fn driven(between_rows_s: f64, acceleration_m_s2: f64) -> Dataset {
         let starts = [11.0, 21.0, 31.0, 41.0].map(|from_s| (from_s, 0.4, acceleration_m_s2));
@@ -115,10 +116,10 @@ mod tests {
         for row in 0..rows {
             let at = |k: usize| (row as f64 + (k as f64 + 0.5) / fine as f64) * between_rows_s;
             let m: f64 = (0..fine).map(|k| speed(at(k))).sum::<f64>() * between_rows_s / fine as f64;
-            angle_rad.push(angle_rad[row] + m / 0.05);
+            angle_rad.push(angle_rad[row] + m / 0.08);
         }
         let t_s: Vec<f64> = (0..=rows).map(|row| row as f64 * between_rows_s).collect();
-        let truth = t_s.iter().zip(&angle_rad).map(|(t_s, rad)| TruthSample::new(*t_s, 0.05 * rad, 0.0, Some(0.0)));
+        let truth = t_s.iter().zip(&angle_rad).map(|(t_s, rad)| TruthSample::new(*t_s, 0.08 * rad, 0.0, Some(0.0)));
         let run = Run {
             info: RunInfo { continuous: true, ..RunInfo::default() },
             truth: truth.step_by(7).collect(),
@@ -129,19 +130,7 @@ mod tests {
             },
             ..Run::default()
         };
-        Dataset {
-            provenance: Provenance::default(),
-            robot: NominalRobot {
-                left_wheel_diameter_m: 0.1,
-                right_wheel_diameter_m: 0.1,
-                wheel_separation_m: 0.3,
-                ticks_per_rev: None,
-                counter_bits: None,
-            },
-            truth_noise: TruthNoise::default(),
-            points: Vec::new(),
-            runs: vec![run],
-        }
+        Dataset { runs: vec![run], ..dataset_of(0, true) }
     }
 
     #[test]

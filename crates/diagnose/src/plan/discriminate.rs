@@ -230,7 +230,7 @@ impl DiscriminationSearch<'_> {
         firsts.flat_map(|(k, first)| self.options[k + 1..].iter().map(move |second| [first, second]))
     }
 
-    /// The kind of run, or two kinds at one speed, that takes the least time.
+    /// The kind of run, or the two kinds, that takes the least time.
     fn quickest(&self, names: &[Pair]) -> Option<(Vec<Part>, f64)> {
         let quicker = |best: Option<(Vec<Part>, f64)>, kinds: &[&Driven], within_min: f64| {
             let least = best.as_ref().map_or(f64::INFINITY, |(_, minutes)| *minutes);
@@ -242,7 +242,7 @@ impl DiscriminationSearch<'_> {
         self.twos().fold(one, |best, two| quicker(best, &two, within_min))
     }
 
-    /// The manoeuvre, or two at one speed, that discriminates causes best within the time, with probability
+    /// The manoeuvre, or the two, that discriminates causes best within the time, with probability
     /// 0.5 at least.
     fn farthest(&self, names: &[Pair]) -> Option<(Vec<Part>, f64)> {
         let singles = self.options.iter().map(|option| vec![option]);
