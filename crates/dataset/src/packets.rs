@@ -35,8 +35,8 @@ impl Packets {
         (rows >= MIN_ROWS && whole as f64 >= MIN_USUAL_SHARE * inner as f64).then_some(Self { of, rows })
     }
 
-    /// When rows were read that are sent some at a time, by the beat that is found of the packets' own stamps:
-    /// their period, and what each of them is late by. `None` of any other log.
+    /// When rows were read that are sent some at a time, by the beat that is found of the packets' own
+    /// stamps: their period, and what each of them is late by. `None` of any other log.
     pub(crate) fn read(t_s: &[f64], beat_of: impl FnOnce(&[f64]) -> Option<(f64, Vec<f64>)>) -> Option<Received> {
         let packets = Self::of(t_s)?;
         let (period_s, late_s) = beat_of(&packets.sent_s(t_s))?;
