@@ -5,11 +5,13 @@
 //! campaign: `YAIR_ROBOTS=40 cargo test --release --test diagnosis ordinary_logs -- --nocapture`.
 #![allow(clippy::print_stdout)] // every case with its seed
 
+use std::f64::consts::PI;
+
 use diagnose::{Document, Finding, Options, diagnose};
 use rayon::prelude::*;
 use statrs::distribution::{Binomial, DiscreteCDF};
 
-use crate::plain_robot::{Event, PlainRobot, Reports, Stamps};
+use crate::plain_robot::{Event, PlainRobot, Records, Reports, Stamps};
 
 fn diagnosed(robot: &PlainRobot) -> Result<Document, String> {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -206,6 +208,140 @@ const KINDS: &[(&str, Change, &[&str])] = &[
         },
         &[],
     ),
+    ("angles", |of| of.records = Records::Angles { step_rad: 0.0 }, &[]),
+    (
+        "angles of 500 ticks at 20 Hz",
+        |of| {
+            (of.records, of.ticks_per_rev, of.odometry_hz) = (Records::Angles { step_rad: 0.0 }, 500.0, 20.0);
+        },
+        &[],
+    ),
+    ("angles in whole milliradians", |of| of.records = Records::Angles { step_rad: 1e-3 }, &[]),
+    ("angles in whole degrees", |of| of.records = Records::Angles { step_rad: PI / 180.0 }, &[]),
+    ("speeds", |of| of.records = Records::Speeds { step_m_s: 0.0 }, &[]),
+    (
+        "speeds of 500 ticks at 20 Hz",
+        |of| {
+            (of.records, of.ticks_per_rev, of.odometry_hz) = (Records::Speeds { step_m_s: 0.0 }, 500.0, 20.0);
+        },
+        &[],
+    ),
+    (
+        "speeds in whole mm/s at 20 Hz",
+        |of| {
+            (of.records, of.odometry_hz) = (Records::Speeds { step_m_s: 1e-3 }, 20.0);
+        },
+        &[],
+    ),
+    (
+        "speeds in whole cm/s at 20 Hz",
+        |of| {
+            (of.records, of.odometry_hz) = (Records::Speeds { step_m_s: 1e-2 }, 20.0);
+        },
+        &[],
+    ),
+    (
+        "speeds, jitter of 2 ms",
+        |of| {
+            (of.records, of.stamps) = (Records::Speeds { step_m_s: 0.0 }, Stamps::Jitter(2e-3));
+        },
+        &["interval_error"],
+    ),
+    (
+        "speeds, 3 % of rows lost",
+        |of| {
+            (of.records, of.lost_rows) = (Records::Speeds { step_m_s: 0.0 }, 0.03);
+        },
+        &["dropped_samples"],
+    ),
+    ("twists", |of| of.records = Records::Twists { step_m_s: 0.0, step_rad_s: 0.0 }, &[]),
+    (
+        "twists of three decimals at 20 Hz",
+        |of| {
+            (of.records, of.odometry_hz) = (Records::Twists { step_m_s: 1e-3, step_rad_s: 1e-3 }, 20.0);
+        },
+        &[],
+    ),
+    (
+        "twists of two decimals at 20 Hz",
+        |of| {
+            (of.records, of.odometry_hz) = (Records::Twists { step_m_s: 1e-2, step_rad_s: 1e-2 }, 20.0);
+        },
+        &[],
+    ),
+    (
+        "rippled speeds in whole mm/s at 20 Hz",
+        |of| {
+            (of.records, of.odometry_hz, of.ripple) = (Records::Speeds { step_m_s: 1e-3 }, 20.0, 0.03);
+        },
+        &[],
+    ),
+    (
+        "rippled speeds in whole cm/s at 20 Hz",
+        |of| {
+            (of.records, of.odometry_hz, of.ripple) = (Records::Speeds { step_m_s: 1e-2 }, 20.0, 0.03);
+        },
+        &[],
+    ),
+    (
+        "rippled twists of three decimals at 20 Hz",
+        |of| {
+            (of.records, of.odometry_hz, of.ripple) =
+                (Records::Twists { step_m_s: 1e-3, step_rad_s: 1e-3 }, 20.0, 0.03);
+        },
+        &[],
+    ),
+    (
+        "rippled twists of two decimals at 20 Hz",
+        |of| {
+            (of.records, of.odometry_hz, of.ripple) =
+                (Records::Twists { step_m_s: 1e-2, step_rad_s: 1e-2 }, 20.0, 0.03);
+        },
+        &[],
+    ),
+    (
+        "rippled speeds of 500 ticks at 20 Hz",
+        |of| {
+            (of.records, of.ticks_per_rev, of.odometry_hz, of.ripple) =
+                (Records::Speeds { step_m_s: 0.0 }, 500.0, 20.0, 0.03);
+        },
+        &[],
+    ),
+    ("rippled, counts at 20 Hz", |of| (of.odometry_hz, of.ripple) = (20.0, 0.03), &[]),
+    ("counters that begin anywhere", |of| of.first_count = -123_456.0, &[]),
+    (
+        "packets of three to seven rows",
+        |of| (of.rows_per_packet, of.more_rows_per_packet) = (3, 4),
+        &["interval_error"],
+    ),
+    (
+        "packets of five, 3 % of rows lost",
+        |of| (of.rows_per_packet, of.lost_rows) = (5, 0.03),
+        &["interval_error", "dropped_samples"],
+    ),
+    ("a minute's rest before and after", |of| (of.stands_s, of.runs) = (60.0, 8), &[]),
+    ("crawls", |of| of.pace = 0.03, &[]),
+    ("poses in whole millimetres and milliradians", |of| of.truth_steps = [1e-3, 1e-3], &[]),
+    (
+        "poses in whole centimetres and degrees",
+        |of| of.truth_steps = [1e-2, PI / 180.0],
+        &["truth_correlated_noise", "unlisted"],
+    ),
+    (
+        "poses in whole centimetres and hundredths, positions of 0.3 mm",
+        |of| {
+            (of.truth_steps, of.truth_sigma_m, of.truth_sigma_rad) = ([1e-2, 1e-2], 3e-4, 3e-4);
+        },
+        &["truth_correlated_noise", "unlisted"],
+    ),
+    ("each pose five times", |of| of.truth_repeats = 5, &["truth_latency", "truth_correlated_noise"]),
+    ("poses stamped with jitter of 5 ms", |of| of.truth_stamps = Stamps::Jitter(5e-3), &["unlisted"]),
+    ("poses received 10 ms late", |of| of.truth_stamps = Stamps::Received(1e-2), &["truth_latency", "unlisted"]),
+    (
+        "poses received 30 ms late",
+        |of| of.truth_stamps = Stamps::Received(3e-2),
+        &["truth_latency", "unlisted", "truth_outliers"],
+    ),
     (
         "positions of 5 mm at 1 Hz",
         |of| (of.reports, of.truth_sigma_m, of.truth_hz) = (Reports::Positions, 5e-3, 1.0),
@@ -289,6 +425,21 @@ const FAULTS: &[(&str, Change, &str)] = &[
         "turn_rate_wheelbase",
     ),
     ("right counter late by 2 ms", |of| of.right_late_s = 2e-3, "sampling_skew"),
+    (
+        "truth 50 ms late, speeds in whole mm/s",
+        |of| (of.latency_s, of.records) = (0.05, Records::Speeds { step_m_s: 1e-3 }),
+        "truth_latency",
+    ),
+    (
+        "wheelbase that grows, twists of three decimals",
+        |of| (of.base_grows_s, of.records) = (0.02, Records::Twists { step_m_s: 1e-3, step_rad_s: 1e-3 }),
+        "turn_rate_wheelbase",
+    ),
+    (
+        "slip with speed, speeds",
+        |of| (of.slip_s_m, of.records) = (0.02, Records::Speeds { step_m_s: 0.0 }),
+        "slip_speed",
+    ),
     // Not normal, and no large errors: neither bumps nor outliers.
     ("uniform errors of the instrument", |of| of.has_uniform_errors = true, "unlisted"),
 ];

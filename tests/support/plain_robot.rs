@@ -29,7 +29,26 @@ pub(crate) enum Reports {
     FirstAndLast,
 }
 
-/// Errors of the stamps of odometry rows.
+/// What a row says of the wheels, nominal sizes taken; what is rounded beside the counts is so in these steps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Records {
+    Counts,
+    /// Angles of the wheels, radians.
+    Angles {
+        step_rad: f64,
+    },
+    /// Speeds of the wheels at the floor, of what was counted since the row before.
+    Speeds {
+        step_m_s: f64,
+    },
+    /// Speed and yaw rate, of what was counted since the row before.
+    Twists {
+        step_m_s: f64,
+        step_rad_s: f64,
+    },
+}
+
+/// Errors of stamps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Stamps {
     Exact,
@@ -63,7 +82,15 @@ pub(crate) struct PlainRobot {
     pub(crate) ticks_per_rev: f64,
     pub(crate) odometry_hz: f64,
     pub(crate) stamps: Stamps,
+    pub(crate) records: Records,
+    /// What the counters hold when a run begins.
+    pub(crate) first_count: f64,
     pub(crate) truth_hz: f64,
+    pub(crate) truth_stamps: Stamps,
+    /// Each pose is sent so many times, at so many times the rate.
+    pub(crate) truth_repeats: usize,
+    /// What poses are rounded to, metres and radians.
+    pub(crate) truth_steps: [f64; 2],
     /// How long after a row each pose is taken, as a share of a row's interval.
     pub(crate) truth_between_rows: f64,
     pub(crate) truth_sigma_m: f64,
@@ -102,6 +129,8 @@ pub(crate) struct PlainRobot {
     pub(crate) logs_changes_alone: bool,
     /// So many rows are sent together, and stamped as they are.
     pub(crate) rows_per_packet: usize,
+    /// And up to so many more, by chance.
+    pub(crate) more_rows_per_packet: usize,
     /// The log begins when the robot moves already.
     pub(crate) starts_moving: bool,
     /// No poses between these times of each run.
@@ -129,6 +158,8 @@ pub(crate) struct PlainRobot {
     /// Its speeds, and what it takes to reach them, relative.
     pub(crate) pace: f64,
     pub(crate) briskness: f64,
+    /// It stands still for so much longer at the ends of runs, seconds.
+    pub(crate) stands_s: f64,
     /// It stands still nowhere but at the ends of runs.
     pub(crate) never_rests: bool,
     /// Runs of one kind alone.
@@ -140,6 +171,34 @@ pub(crate) struct PlainRobot {
     pub(crate) seed: u64,
 }
 
+impl Records {
+    const fn columns(self) -> &'static str {
+        match self {
+            Self::Counts => "left_ticks,right_ticks",
+            Self::Angles { .. } => "left_rad,right_rad",
+            Self::Speeds { .. } => "left_mps,right_mps",
+            Self::Twists { .. } => "v_mps,omega_radps",
+        }
+    }
+}
+
+impl Stamps {
+    /// The stamp of what is of this time; the next one is later.
+    fn of(self, true_s: f64, draws: &mut Draws) -> f64 {
+        match self {
+            Self::Exact => true_s,
+            Self::Jitter(sigma_s) => true_s + sigma_s * draws.normal(),
+            Self::Received(mean_s) => true_s - mean_s * (1.0 - draws.uniform()).ln(),
+            Self::RoundedTo(step_s) => (true_s / step_s).round() * step_s,
+        }
+    }
+}
+
+/// A value in whole steps; as it is without.
+fn in_steps_of(step: f64, value: f64) -> f64 {
+    if step > 0.0 { (value / step).round() * step } else { value }
+}
+
 impl PlainRobot {
     /// 20 000 ticks a turn at 100 Hz, poses of 1 mm and 1 mrad at 10 Hz, nothing wrong.
     pub(crate) fn ordinary(seed: u64) -> Self {
@@ -147,7 +206,12 @@ impl PlainRobot {
             ticks_per_rev: 20_000.0,
             odometry_hz: 100.0,
             stamps: Stamps::Exact,
+            records: Records::Counts,
+            first_count: 0.0,
             truth_hz: 10.0,
+            truth_stamps: Stamps::Exact,
+            truth_repeats: 1,
+            truth_steps: [0.0; 2],
             truth_between_rows: 0.0,
             truth_sigma_m: 1e-3,
             truth_sigma_rad: 1e-3,
@@ -169,6 +233,7 @@ impl PlainRobot {
             right_late_s: 0.0,
             logs_changes_alone: false,
             rows_per_packet: 1,
+            more_rows_per_packet: 0,
             starts_moving: false,
             truth_pause_s: None,
             lost_poses: 0.0,
@@ -183,6 +248,7 @@ impl PlainRobot {
             scale: 1.0,
             pace: 1.0,
             briskness: 1.0,
+            stands_s: 0.0,
             never_rests: false,
             only: None,
             runs: 21,
@@ -198,7 +264,7 @@ impl PlainRobot {
         let base_m = self.scale * 0.363 * (1.0 + 0.01 * draws.normal());
         let radius_m = [0; 2].map(|_| self.scale * 0.08 * (1.0 + 3e-3 * draws.normal()));
         let phase_rad = TAU * draws.uniform();
-        let (mut odometry, mut truth) = (String::from("run,t_s,left_ticks,right_ticks\n"), String::new());
+        let (mut odometry, mut truth) = (format!("run,t_s,{}\n", self.records.columns()), String::new());
         truth.push_str("run,t_s,x_m,y_m,theta_rad\n");
         let mut described = String::new();
         let programs: Vec<(&str, Vec<Part>)> = programs(&mut draws)

@@ -29,6 +29,7 @@ mod read;
 mod read_times;
 mod receipt_delays;
 mod record;
+mod recorded_step;
 mod replicates;
 mod retained_rows;
 mod row_lengths;

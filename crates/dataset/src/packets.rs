@@ -1,24 +1,40 @@
 //! Rows that a controller keeps and sends some at a time: those of a packet are received in one moment,
 //! though they were read a sampling period after each other.
 //!
-//! All packets have as many rows but few. The last of a packet is held to be read when it is sent, on the
-//! beat of the packets.
+//! Where packets have as many rows each, but where one was lost, they are sent on a beat of their own, and
+//! the last row of each is held to be read when it is sent. Where they have now more and now fewer, as a
+//! sender makes them that looks now and then for what there is, no row is lost, and the last row of each is
+//! read on the rows' own beat, about when it is sent. Packets that lost rows leave that beat.
 
 use std::ops::Range;
 
 use crate::receipt_delays::{Received, rows_on_heels};
 
-/// Share of the packets that have as many rows at the least; of rows that hold up each other by chance,
-/// bunches of one size are half at most.
-const MIN_USUAL_SHARE: f64 = 0.9;
+/// Share of the packets that have as many rows at the least, and of those that have more at the most: a row
+/// of others is lost. Of rows that hold up each other by chance, bunches of one size are half at most, and
+/// many have more.
+const MIN_WHOLE_SHARE: f64 = 0.5;
+const MAX_LARGER_SHARE: f64 = 0.02;
+/// Share of the packets that have half to twice as many rows as the middle one, at the least; of bunches by
+/// chance about half do.
+const MIN_SIMILAR_SHARE: f64 = 0.9;
 /// Rows of a packet at the least: two come on each other's heels where a motion ends.
 const MIN_ROWS: usize = 2;
+/// What packets that have now more and now fewer rows are off the rows' beat by at the most, root mean
+/// square, in beats. A sender that looks now and then is late by up to one: 0.29. So many rows that are lost
+/// anywhere make it twice as much, √(n/15) of a random walk about its line; where fewer packets are short,
+/// rows were lost.
+const MAX_OFF: f64 = 0.45;
+const MIN_SHORT: usize = 12;
 
 /// The rows of each packet.
 pub(crate) struct Packets {
     of: Vec<Range<usize>>,
     /// How many rows they usually have.
     rows: usize,
+    /// Where they have now more and now fewer: when the log's first row was read, and the rows' period,
+    /// seconds.
+    row_timing_s: Option<[f64; 2]>,
 }
 
 impl Packets {
@@ -28,17 +44,33 @@ impl Packets {
         let firsts: Vec<usize> = (0..t_s.len()).filter(|row| !on_heels[*row]).collect();
         let ends = firsts[1..].iter().copied().chain([t_s.len()]);
         let of: Vec<Range<usize>> = firsts.iter().copied().zip(ends).map(|(from, to)| from..to).collect();
-        let rows = of[of.len() / 2].len();
         // Of the first and the last the log may have a part.
-        let whole = of.iter().filter(|packet| packet.len() == rows).count();
-        let inner = of.len().saturating_sub(2);
-        (rows >= MIN_ROWS && whole as f64 >= MIN_USUAL_SHARE * inner as f64).then_some(Self { of, rows })
+        let mut sizes: Vec<usize> = of.get(1..of.len() - 1)?.iter().map(Range::len).collect();
+        sizes.sort_unstable();
+        let share = |is_so: &dyn Fn(usize) -> bool| {
+            sizes.iter().filter(|rows| is_so(**rows)).count() as f64 / sizes.len() as f64
+        };
+        let most_often = sizes.chunk_by(|a, b| a == b).max_by_key(|alike| alike.len())?[0];
+        let whole = share(&|rows| rows == most_often);
+        let are_alike = whole >= MIN_WHOLE_SHARE && share(&|rows| rows > most_often) <= MAX_LARGER_SHARE;
+        let middle = sizes[sizes.len() / 2];
+        let are_similar = || share(&|rows| 2 * rows >= middle && rows <= 2 * middle) >= MIN_SIMILAR_SHARE;
+        let short = sizes.iter().filter(|rows| **rows < most_often).count();
+        let row_timing_s =
+            if (!are_alike || short >= MIN_SHORT) && are_similar() { row_timing_s(&of, t_s) } else { None };
+        let rows = if row_timing_s.is_some() { middle } else { most_often };
+        (rows >= MIN_ROWS && (are_alike || row_timing_s.is_some())).then_some(Self { of, rows, row_timing_s })
     }
 
-    /// When rows were read that are sent some at a time, by the beat that is found of the packets' own
-    /// stamps: their period, and what each of them is late by. `None` of any other log.
+    /// When rows were read that are sent some at a time. Where packets have as many rows each, it is found of
+    /// the packets' own stamps: `beat_of` them is their period, and what each of them is late by. `None` of any
+    /// other log.
     pub(crate) fn read(t_s: &[f64], beat_of: impl FnOnce(&[f64]) -> Option<(f64, Vec<f64>)>) -> Option<Received> {
         let packets = Self::of(t_s)?;
+        if let Some([first_s, period_s]) = packets.row_timing_s {
+            let read_s = (0..t_s.len()).map(|row| first_s + period_s * row as f64).collect();
+            return Some(Received { period_s, read_s });
+        }
         let (period_s, late_s) = beat_of(&packets.sent_s(t_s))?;
         packets.rows_read(t_s, (period_s, &late_s))
     }
@@ -61,7 +93,24 @@ impl Packets {
     }
 }
 
-/// How many rows come at a time, where a log's rows are kept and sent in packets; by stamps that do not fall.
+/// The line through the stamps of the packets' last rows on their numbers: the time of row 0 and the rows'
+/// period, seconds; `None` where packets are off it.
+fn row_timing_s(packets: &[Range<usize>], t_s: &[f64]) -> Option<[f64; 2]> {
+    let last = || packets.iter().map(|packet| ((packet.end - 1) as f64, t_s[packet.end - 1]));
+    let count = packets.len() as f64;
+    let (rows, seconds) = last().fold((0.0, 0.0), |(rows, seconds), (row, sent_s)| (rows + row, seconds + sent_s));
+    let (middle_row, middle_s) = (rows / count, seconds / count);
+    let (products, squares) = last().fold((0.0, 0.0), |(products, squares), (row, sent_s)| {
+        (products + (row - middle_row) * (sent_s - middle_s), squares + (row - middle_row).powi(2))
+    });
+    let period_s = products / squares;
+    let first_s = middle_s - period_s * middle_row;
+    let squares_s2: f64 = last().map(|(row, sent_s)| (sent_s - first_s - period_s * row).powi(2)).sum();
+    ((squares_s2 / count).sqrt() <= MAX_OFF * period_s).then_some([first_s, period_s])
+}
+
+/// How many rows come at a time, usually, where a log's rows are kept and sent in packets; by stamps that do
+/// not fall.
 #[must_use]
 pub fn rows_per_packet(t_s: &[f64]) -> Option<usize> {
     Packets::of(t_s).map(|packets| packets.rows)
@@ -108,6 +157,39 @@ mod tests {
             assert!(right + rows as usize >= sent.len(), "{right} of {} for {rows}", sent.len());
             assert_eq!(found.numbers.last(), Some(&(200 * rows - 2)));
         }
+    }
+
+    #[test]
+    fn rows_of_packets_of_any_size_are_on_their_own_beat() {
+        // A sender that looks for rows every 47 ms; a row takes 0.1 ms on the line.
+        let mut sent: Vec<[f64; 2]> = Vec::new();
+        for row in 0..1500 {
+            let read_s = PERIOD_S * f64::from(row);
+            let sent_s = (read_s / 0.047).ceil() * 0.047;
+            let next_s = sent.last().map_or(sent_s, |[_, before_s]| sent_s.max(before_s + 1e-4));
+            sent.push([read_s, next_s]);
+        }
+        assert!(matches!(rows_per_packet(&stamps_s(&sent)), Some(4 | 5)));
+        let found = SamplingPeriod::of(&stamps_s(&sent)).expect("packets");
+        assert!((found.period_s / PERIOD_S - 1.0).abs() < 1e-4, "{}", found.period_s);
+        assert_eq!(found.numbers, (0..1500).collect::<Vec<i64>>());
+        // The sender looks a half period after the last row was read on average; rows take another 0.4 ms.
+        let wrong = sent.iter().zip(&found.late_s).map(|([read_s, stamp_s], late_s)| stamp_s - late_s - read_s);
+        assert!(wrong.clone().all(|wrong_s| (4e-3..7e-3).contains(&wrong_s)), "{:?}", wrong.fold(0.0, f64::max));
+        // Where rows are lost their numbers are not known.
+        let mut draws = Draws(14);
+        sent.retain(|_| draws.uniform() > 0.05);
+        assert!(Packets::of(&stamps_s(&sent)).is_none_or(|packets| packets.row_timing_s.is_none()));
+    }
+
+    #[test]
+    fn packets_of_which_rows_are_lost_keep_their_beat() {
+        let mut draws = Draws(13);
+        let mut sent = sent_by(5);
+        sent.retain(|_| draws.uniform() > 0.05);
+        assert_eq!(rows_per_packet(&stamps_s(&sent)), Some(5));
+        let found = SamplingPeriod::of(&stamps_s(&sent)).expect("packets");
+        assert!((found.period_s / PERIOD_S - 1.0).abs() < 1e-3, "{}", found.period_s);
     }
 
     #[test]

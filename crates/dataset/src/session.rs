@@ -89,7 +89,7 @@ impl<'a> RunView<'a> {
             }
             WheelLog::Angles(angles) => Some(Wheels { left: ends(&angles.left)?, right: ends(&angles.right)? }),
             WheelLog::Speeds(_) | WheelLog::Twist { .. } => {
-                let angles = self.rebuilt_angles_rad(robot)?;
+                let angles = self.angles_by_rates_rad(robot)?;
                 Some(Wheels { left: *angles.left.last()?, right: *angles.right.last()? })
             }
         }
@@ -121,7 +121,7 @@ impl<'a> RunView<'a> {
             }
             WheelLog::Angles(angles) => angles.as_ref().map(|column| turned(column)),
             WheelLog::Speeds(_) | WheelLog::Twist { .. } => {
-                self.rebuilt_angles_rad(robot).map_or(Wheels::both(0.0), |angles| angles.map(|column| turned(&column)))
+                self.angles_by_rates_rad(robot).map_or(Wheels::both(0.0), |angles| angles.map(|column| turned(&column)))
             }
         };
         0.25 * (turned_rad.left * robot.left_wheel_diameter_m + turned_rad.right * robot.right_wheel_diameter_m)
@@ -140,20 +140,32 @@ impl<'a> RunView<'a> {
         }
     }
 
-    /// Wheel angles by the nominal geometry: a row's speeds hold over the interval that ends there.
-    fn rebuilt_angles_rad(&self, robot: &NominalRobot) -> Option<Wheels<Vec<f64>>> {
+    /// Wheel angles at the rows by the nominal geometry, radians since the first, of a robot that reports speeds
+    /// or its twist: a row's speeds hold over the interval that ends there. Where rows are missing on a regular
+    /// beat, they hold over the last beat; before it the wheels went on from the speeds of the row before, half
+    /// of the time for each as speeds change steadily.
+    #[must_use]
+    pub fn angles_by_rates_rad(&self, robot: &NominalRobot) -> Option<Wheels<Vec<f64>>> {
         let m_per_rad = robot.geometry().ok()?.m_per_rad();
         let t_s = &self.run.odometry.t_s;
-        let (mut angle_rad, mut previous_s) = (Wheels::both(0.0), None);
+        let regular = if self.run.info.continuous { t_s.sampling_period() } else { None };
+        let regular = regular.filter(|period| period.is_certain() && !period.is_bunched);
+        let is_row_missing = |row: usize| regular.is_some_and(|of| of.numbers[row] - of.numbers[row - 1] > 1);
+        let period_s = regular.map_or(0.0, |period| period.period_s);
+        let mut angle_rad = Wheels::both(0.0);
+        let mut before_m_s: Option<Wheels<f64>> = None;
         let mut angles = Wheels { left: Vec::with_capacity(t_s.len()), right: Vec::with_capacity(t_s.len()) };
-        for (row, &t_s) in t_s.iter().enumerate() {
-            let dt_s = t_s - previous_s.unwrap_or(t_s);
-            previous_s = Some(t_s);
+        for row in 0..t_s.len() {
             let speed_m_s = self.reported_speed_m_s(robot, row)?;
-            angle_rad = angle_rad.zip_with(
-                speed_m_s.zip_with(m_per_rad, |speed_m_s, m_per_rad| speed_m_s * dt_s / m_per_rad),
-                |angle, turn| angle + turn,
-            );
+            if let Some(before_m_s) = before_m_s {
+                let row_s = t_s[row] - t_s[row - 1];
+                let missing_s = if is_row_missing(row) { (row_s - period_s).max(0.0) } else { 0.0 };
+                let travel_m =
+                    speed_m_s.zip_with(before_m_s, |now, before| now * row_s - 0.5 * missing_s * (now - before));
+                let turned_rad = travel_m.zip_with(m_per_rad, |travel_m, m_per_rad| travel_m / m_per_rad);
+                angle_rad = angle_rad.zip_with(turned_rad, |angle, turn| angle + turn);
+            }
+            before_m_s = Some(speed_m_s);
             angles.left.push(angle_rad.left);
             angles.right.push(angle_rad.right);
         }
@@ -195,7 +207,7 @@ impl<'a> RunView<'a> {
                 reckoner(geometry.m_per_rad()).for_each_pose(start, columns, &mut with_time);
             }
             WheelLog::Speeds(_) | WheelLog::Twist { .. } => {
-                let Some(angles) = self.rebuilt_angles_rad(robot) else { return };
+                let Some(angles) = self.angles_by_rates_rad(robot) else { return };
                 let columns = Wheels { left: &angles.left[..], right: &angles.right[..] };
                 reckoner(geometry.m_per_rad()).for_each_pose(start, columns, &mut with_time);
             }
@@ -360,6 +372,29 @@ mod tests {
             points: vec![point("left", 0.25), point("right", -0.2)],
             runs: vec![run],
         }
+    }
+
+    #[test]
+    fn rates_go_on_steadily_over_rows_that_are_missing() {
+        // Both wheels at k/100 m/s in row k, of 0.1 s; row 20 is missing.
+        let rows: Vec<u32> = (0..60).filter(|row| *row != 20).collect();
+        let speeds: Vec<f64> = rows.iter().map(|row| 0.01 * f64::from(*row)).collect();
+        let of = |continuous| {
+            let mut run = Run::default();
+            run.info.continuous = continuous;
+            run.odometry.t_s = rows.iter().map(|row| 0.1 * f64::from(*row)).collect();
+            run.odometry.wheels = WheelLog::Speeds(Wheels::both(speeds.clone()));
+            let dataset = dataset(run);
+            let angles = dataset.session().runs[0].angles_by_rates_rad(&dataset.robot).expect("speeds");
+            // Metres over the gap, and over the row behind it.
+            [angles.left[20] - angles.left[19], angles.left[21] - angles.left[20]].map(|rad| 0.08 * rad)
+        };
+        // At 0.21 m/s for a tenth of a second, and at the mean of that and 0.19 m/s for the one before.
+        let [over_gap_m, behind_m] = of(true);
+        assert!((over_gap_m - (0.021 + 0.020)).abs() < 1e-12 && (behind_m - 0.022).abs() < 1e-12, "{over_gap_m}");
+        // In a log with gaps a row is as long as it is.
+        let [over_gap_m, behind_m] = of(false);
+        assert!((over_gap_m - 0.042).abs() < 1e-12 && (behind_m - 0.022).abs() < 1e-12, "{over_gap_m}");
     }
 
     #[test]

@@ -39,3 +39,15 @@ pub const MIN_LIDAR_TURN_RAD: f64 = 1.0;
 /// Seconds. Rows that lie farther apart on average are not stamped in seconds.
 /// Convention: wheels are logged at 1 Hz or more.
 pub const MAX_ROW_S: f64 = 4.0;
+
+/// Most decimals of recorded rates that count as rounded.
+/// Budgeted: 10 µm/s for a minute displace a robot by a fraction of a millimetre.
+pub(crate) const MAX_DECIMALS: i32 = 5;
+
+/// How far a rounded rate, in its steps, is from a whole number.
+/// Budgeted: files say six digits of a number, and single precision has seven.
+pub(crate) const DECIMAL_TOLERANCE: f64 = 1e-3;
+
+/// Distinct values of the rates of a run from which on their decimals are those of rounding.
+/// Budgeted: robots are told to drive at some round speeds, and speed up through many.
+pub(crate) const MIN_DISTINCT_RATES: usize = 8;

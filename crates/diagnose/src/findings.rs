@@ -14,7 +14,6 @@ use crate::finding;
 use crate::finding::Finding;
 use crate::geometry_deviations::remaining_deviations;
 use crate::lack_of_fit::lack_of_fit;
-use crate::map_errors::without_map_errors;
 use crate::mean_lateness::join_clock;
 use crate::mean_structure::MeanStructure;
 use crate::model_comparison::form_error_statistic;
@@ -24,6 +23,7 @@ use crate::settings::findings::DEPENDENCE_BEYOND_NOISE_LEVEL;
 use crate::settings::levels::MAX_EFFECTS;
 use crate::sparse_terms::UncataloguedTerms;
 use crate::stamp_errors::{StampError, have_uncertain_rows};
+use crate::systematic_errors::without_systematic_errors;
 use crate::unknown_motion::Anomaly;
 use crate::wald::wald_test;
 
@@ -290,7 +290,7 @@ fn doubt_what_does_not_carry_over(results: &StageResults<'_, '_>, mut findings: 
 
 /// What the instrument's map explains by its errors, which return with the place.
 fn without_errors_of_the_map(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
-    without_map_errors(&mut findings, &results.structure.base, results.structure.model());
+    without_systematic_errors(&mut findings, &results.structure.base, results.structure.model());
     findings
 }
 

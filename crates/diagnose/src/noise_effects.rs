@@ -20,6 +20,7 @@ use crate::errors_at_rest::{ErrorsAtRest, errors_at_rest};
 use crate::finding;
 use crate::finding::Finding;
 use crate::mean_structure::MeanStructure;
+use crate::null_distribution::{NullDistribution, among_simulated};
 use crate::outlier_attribution::{ErrorSource, log_likelihoods};
 use crate::residual_tests::residual_persistence;
 use crate::run_to_run::differs_from_run_to_run;
@@ -166,9 +167,19 @@ fn of_turns(structure: &MeanStructure<'_>, without_ids: &[String]) -> Option<Fin
 
 /// The p-value of what turns scatter by beyond the wheels' noise; `None` where the fit without noise of turns
 /// diverges. Where counts are coarse, what they are rounded by grows with turns until a count is full, and
-/// makes turn noise likelier; it is soon over, and no turn differs from another by it.
+/// makes turn noise likelier; it is soon over, and no turn differs from another by it. By the rounding of
+/// recorded rates turns do differ, and they are judged among those of simulated runs.
 fn p_of_turn_scatter(model: &AugmentedModel<'_>) -> Option<f64> {
-    let differ = [differs_from_run_to_run(model), differs_from_turn_to_turn(model)];
+    let differ = |model: &AugmentedModel<'_>| [differs_from_run_to_run(model), differs_from_turn_to_turn(model)];
+    let mut p_values = differ(model).to_vec();
+    let may_be_found = p_values.iter().any(|p_value| *p_value < TURN_SCATTER_LEVEL);
+    if let Some(null) = NullDistribution::of(model).filter(|_| may_be_found) {
+        let simulated =
+            null.resimulated(|fit| differ(&AugmentedModel { fit: fit.clone(), candidates: model.candidates.clone() }));
+        for (test, p_value) in p_values.iter_mut().enumerate() {
+            *p_value = among_simulated(*p_value, simulated.iter().map(|of| &of[test]));
+        }
+    }
     let without = || {
         let fit = model.fit.without_noise(NoiseComponent::Turn, &mut terms(&model.candidates)).ok()?;
         let most = count(&fit).max(count(&model.fit));
@@ -176,7 +187,7 @@ fn p_of_turn_scatter(model: &AugmentedModel<'_>) -> Option<f64> {
         Some(0.5 * p_of_chi_square(statistic.max(0.0), 1.0))
     };
     let by_ratio = if model.fit.depends_on_rounding() { None } else { Some(without()?) };
-    let p_values: Vec<f64> = differ.into_iter().chain(by_ratio).collect();
+    p_values.extend(by_ratio);
     let least = p_values.iter().copied().fold(1.0, f64::min);
     Some((p_values.len() as f64 * least).min(1.0))
 }

@@ -170,6 +170,7 @@ mod tests {
                 starts_within_row: false,
                 interpolated_rad2: [Wheels::both(0.0); 2],
                 restored_rad2: Wheels::both(0.0),
+                rate_steps: [0; 2],
             })
             .collect();
         let geometry = DriveGeometry::new(Wheels::both(2.0), 0.5).expect("a drive");
@@ -212,6 +213,7 @@ mod tests {
                 starts_within_row: false,
                 interpolated_rad2: [Wheels::both(0.0); 2],
                 restored_rad2: Wheels::both(0.0),
+                rate_steps: [0; 2],
             }
         };
         turns.iter().map(of).collect()

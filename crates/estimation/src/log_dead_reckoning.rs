@@ -70,6 +70,7 @@ impl<'a> LogDeadReckoning<'a> {
             wheel_rad: track.first_rad(),
             quantum_rad: track.quantum_rad(),
             rate_window: track.rate_window(),
+            rate_rounding: track.rate_rounding(),
             session_m,
         };
         Some(Self { segment, instants, distance_m: track.distance_m(robot) })

@@ -53,6 +53,8 @@ pub struct ModelFit<'a> {
     pub(crate) ends: ConvergenceCriterion,
     /// Normal equations of parts, for a fit whose records have no measurements.
     pub(crate) parts: Vec<NormalEquations>,
+    /// What systematic errors add to the covariance of the free columns, of such a fit.
+    pub(crate) by_systematic_errors: Option<DMatrix<f64>>,
     /// Displacements of a run count as a series when autocorrelation is tested.
     pub(crate) displacements_in_series: bool,
     /// Measurements are not gated: outliers are taken too.
@@ -86,6 +88,7 @@ impl<'a> ModelFit<'a> {
             prior,
             ends,
             parts: Vec::new(),
+            by_systematic_errors: None,
             displacements_in_series,
             ungated: false,
         }
@@ -100,6 +103,7 @@ impl ModelFit<'_> {
             Pass { innovations: Arc::default(), outliers: Vec::new(), partial_outliers: Vec::new(), ..solution.pass };
         let solution = Solution { pass, ..solution };
         let (displacements_in_series, ungated) = (self.displacements_in_series, self.ungated);
+        let by_systematic_errors = self.by_systematic_errors;
         ModelFit {
             records: Arc::new(records),
             selections: Arc::default(),
@@ -112,6 +116,7 @@ impl ModelFit<'_> {
             prior,
             ends,
             parts,
+            by_systematic_errors,
             displacements_in_series,
             ungated,
         }

@@ -127,6 +127,7 @@ pub fn fit_large(
     let robot = *sessions.first().ok_or(EstimationError::NoSession)?.robot;
     let names: Vec<String> = sessions.iter().map(|session| session.name.to_owned()).collect();
     let ids = datasets.iter().map(|blocks| blocks.infos().iter().map(|info| info.id.clone()).collect()).collect();
+    first.by_systematic_errors = first.covariance_by_systematic_errors();
     // The subsamples are needed no more.
     let mut found = first.with_records(Records { ids, ..Records::nothing() });
     let mut passes = 0;

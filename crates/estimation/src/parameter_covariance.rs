@@ -3,7 +3,6 @@
 use model_term::ModelTerm;
 use nalgebra::DMatrix;
 
-use crate::map_distortion::{MapShifts, OwnScatter};
 use crate::model::Column;
 use crate::model_fit::ModelFit;
 use crate::normal_equations::{ClusterRobust, Information};
@@ -11,26 +10,28 @@ use crate::optimizer::Solution;
 use crate::pass::pass;
 use crate::pass_options::{OutlierGate, PassOptions};
 use crate::settings::INFORMATION_WEIGHT_RUNS;
+use crate::systematic_errors::{OwnScatter, Shifts, SystematicErrors};
 
 impl ModelFit<'_> {
     /// Covariance of the free columns: the inverse information, and more of the scatter over runs the more
     /// there are beyond the parameters (cluster-robust, with the leverage of each run; Liang & Zeger 1986;
     /// Bell & McCaffrey 2002). Both add like variances that are known from so many runs each. A run that
     /// alone shows a parameter says nothing of its scatter; blocks of a run do not count, as what one leaves
-    /// goes on in the next. A stated distortion of the map adds to it. `terms` are those of the fit. `None`
+    /// goes on in the next. A stated distortion of the map adds to it, and so
+    /// does the rounding of recorded rates. `terms` are those of the fit. `None`
     /// where rounding is all that there is of it.
     #[must_use]
     pub fn covariance(&self, terms: &mut [Box<dyn ModelTerm>]) -> Option<DMatrix<f64>> {
         let free = self.free_basis();
         let (_, inverse) = self.solution.information(&self.columns)?.along(&free).solve()?;
         let runs = &self.solution.pass.runs;
-        // Where nothing is determined, a map has nothing to add to.
-        let map = if inverse.is_empty() { None } else { self.map_shifts(&free, terms) };
-        let beside_map = |covariance: DMatrix<f64>, own| match &map {
-            Some(map) => covariance + map.added_covariance(own, &inverse),
+        // Where nothing is determined, they have nothing to add to.
+        let systematic = if inverse.is_empty() { None } else { self.systematic_errors(&free, terms) };
+        let with_systematic = |covariance: DMatrix<f64>, own| match &systematic {
+            Some(errors) => covariance + errors.added_covariance(own, &inverse),
             None => covariance,
         };
-        let mut along = beside_map(inverse.clone(), OwnScatter::NotCounted);
+        let mut along = with_systematic(inverse.clone(), OwnScatter::NotCounted);
         let clusters: Vec<Information> = runs.iter().map(|run| run.of(&self.columns).along(&free)).collect();
         let spare = effective_number(&inverse, &clusters) - free.ncols() as f64;
         if spare > 0.0 {
@@ -41,25 +42,40 @@ impl ModelFit<'_> {
                 let by_scale = &inverse * free.row(scale).transpose() / sigma;
                 robust += &by_scale * by_scale.transpose();
             }
-            robust = beside_map(robust, OwnScatter::Counted);
+            robust = with_systematic(robust, OwnScatter::Counted);
             along = (robust * spare + along * INFORMATION_WEIGHT_RUNS) / (spare + INFORMATION_WEIGHT_RUNS);
         }
-        with_variances(&free * along * free.transpose())
+        let whole = &free * along * free.transpose();
+        with_variances(self.by_systematic_errors.as_ref().map_or(whole.clone(), |added| whole + added))
     }
 
-    /// How a stated distortion of the instrument's map shifts the runs' gradients along a basis; `None` where
-    /// none is stated.
-    fn map_shifts(&self, free: &DMatrix<f64>, terms: &mut [Box<dyn ModelTerm>]) -> Option<MapShifts> {
+    /// What systematic errors add to the covariance of the free columns; `None` where there are none.
+    pub(crate) fn covariance_by_systematic_errors(&self) -> Option<DMatrix<f64>> {
+        let free = self.free_basis();
+        let (_, inverse) = self.solution.information(&self.columns)?.along(&free).solve()?;
+        let errors = self.systematic_errors(&free, &mut []).filter(|_| !inverse.is_empty())?;
+        Some(&free * errors.added_covariance(OwnScatter::NotCounted, &inverse) * free.transpose())
+    }
+
+    /// How systematic errors shift the runs' gradients along a basis; `None` where there are none.
+    fn systematic_errors(&self, free: &DMatrix<f64>, terms: &mut [Box<dyn ModelTerm>]) -> Option<SystematicErrors> {
         let Solution { model, noise, free_headings, .. } = &self.solution;
-        // The counts are integrated once: they are the same wherever the poses are.
+        // The wheels' turns are integrated once: they are the same wherever the poses are.
         let mut kept = None;
-        Some(MapShifts::of(&self.records, self.records.map?, |records| {
-            let (gate, by, keep) = (OutlierGate::Off, kept.as_ref(), kept.is_none());
+        SystematicErrors::of(&self.records, |records, shifts| {
+            let by = kept.as_ref().filter(|_| shifts == Shifts::Poses);
+            let (gate, keep) = (OutlierGate::Off, kept.is_none());
             let options = PassOptions { gate, keep, by, ..PassOptions::default() };
             let found = pass(records, &self.selections, model, noise, free_headings, terms, options);
             kept = kept.take().or(found.cached);
             found.runs.iter().map(|run| run.of(&self.columns).along(free)).collect()
-        }))
+        })
+    }
+
+    /// Are there errors that do not average out?
+    #[must_use]
+    pub fn has_systematic_errors(&self) -> bool {
+        self.records.map.is_some() || self.records.segments.iter().any(|segment| segment.rate_rounding.is_any())
     }
 }
 

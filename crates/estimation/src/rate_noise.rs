@@ -142,6 +142,7 @@ mod tests {
             starts_within_row,
             interpolated_rad2: EXACT,
             restored_rad2: Wheels::both(0.0),
+            rate_steps: [0; 2],
         }
     }
 

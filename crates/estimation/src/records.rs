@@ -380,6 +380,7 @@ fn base<'a>(
         wheel_rad: track.first_rad(),
         quantum_rad: track.quantum_rad(),
         rate_window: track.rate_window(),
+        rate_rounding: track.rate_rounding(),
         session_m,
     }
 }

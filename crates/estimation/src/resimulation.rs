@@ -20,21 +20,34 @@ use crate::optimizer::Solution;
 use crate::pass::Pass;
 use crate::propagation::{CarriedState, Propagator};
 use crate::rate_noise::RateNoise;
+use crate::recorded_rates::RecordedRate;
 use crate::rounding::PoseVariance;
 use crate::segment::{MeasuredPose, Segment, Start};
 use crate::settings::MIN_RESIMULATED_VARIANCE_RATIO;
 use crate::wheel_angles::WheelInterval;
 
 impl ModelFit<'_> {
-    /// Has the rounding of counts a part in what measurements are off by, so that the distributions of tests
+    /// Has the rounding of counts or rates a part in what measurements are off by, so that the distributions of tests
     /// depend on it?
     #[must_use]
     pub fn depends_on_rounding(&self) -> bool {
         let [_, _, position_m2, heading_rad2] = self.solution.noise.variance;
         self.records.segments.iter().any(|segment| {
             let of_counts = PoseVariance::of_rounding(segment.quantum_rad, &self.solution.model);
-            of_counts.along_m2 > MIN_RESIMULATED_VARIANCE_RATIO * position_m2
-                || of_counts.heading_rad2 > MIN_RESIMULATED_VARIANCE_RATIO * heading_rad2
+            let [along_m2, turn_rad2] = segment.variance_of_rates(&self.solution.model);
+            of_counts.along_m2 + along_m2 > MIN_RESIMULATED_VARIANCE_RATIO * position_m2
+                || of_counts.heading_rad2 + turn_rad2 > MIN_RESIMULATED_VARIANCE_RATIO * heading_rad2
+        })
+    }
+
+    /// Are rates rounded by more than the instrument errs by, where they stand? What is left of the measurements
+    /// says nothing of the instrument's errors then.
+    #[must_use]
+    pub fn rates_are_coarser_than_measurements(&self) -> bool {
+        let [_, _, position_m2, heading_rad2] = self.solution.noise.variance;
+        self.records.segments.iter().any(|segment| {
+            let [along_m2, turn_rad2] = segment.variance_of_rates(&self.solution.model);
+            along_m2 > position_m2 || turn_rad2 > heading_rad2
         })
     }
 
@@ -73,7 +86,8 @@ impl ModelFit<'_> {
         for (index, segment) in records.segments.iter_mut().enumerate() {
             let mut draws = Draws::of(number, index);
             let smooth = smooth_turns(segment, &mut draws);
-            let rolled = self.rolled(segment, &smooth, &mut draws);
+            let mut rolled = self.rolled(segment, &smooth, &mut draws);
+            unround_rates(&mut rolled, number, &mut draws);
             let before = carried.take().filter(|_| segment.continues);
             carried = Some(self.measure_again(segment, &rolled, index, before, terms, &mut draws));
             count_again(segment, &smooth, &mut draws);
@@ -178,6 +192,24 @@ fn smooth_turns(segment: &Segment<'_>, draws: &mut Draws) -> Vec<Wheels<f64>> {
     smooth
 }
 
+/// The wheels turn by what the rounding of the recorded rates leaves out.
+fn unround_rates(rolled: &mut Segment<'_>, number: u64, draws: &mut Draws) {
+    let rounding = rolled.rate_rounding;
+    if !rounding.is_any() {
+        return;
+    }
+    for interval in &mut rolled.intervals {
+        let errors = [0, 1].map(|rate| {
+            let Some((recorded, sense)) = RecordedRate::of(rate, interval.rate_steps) else { return 0.0 };
+            let shared = rounding.shared[rate];
+            let own = (1.0 - shared * shared).sqrt() * (draws.uniform() - 0.5);
+            shared * sense * (Draws::of_rate(number, recorded).uniform() - 0.5) + own
+        });
+        let turned_rad = rounding.turned_rad(errors, interval.dt_s);
+        interval.wheel_rad = interval.wheel_rad.zip_with(turned_rad, |turn, more| turn + more);
+    }
+}
+
 /// Counts the smoothed turns at the ends of rows, each wheel from a random phase on. Within a row the counts
 /// go as the smoothed turns do, as those of a log are interpolated; rates have the rounding of the counts
 /// around them, as a log's have.
@@ -222,6 +254,12 @@ struct Draws(Xoshiro256PlusPlus);
 impl Draws {
     fn of(number: u64, segment: usize) -> Self {
         Self(Xoshiro256PlusPlus::seed_from_u64(number.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ segment as u64))
+    }
+
+    /// Those of a recorded rate, which all runs share.
+    fn of_rate(number: u64, RecordedRate { rate, steps }: RecordedRate) -> Self {
+        let address = (u64::from(steps.cast_unsigned()) << 1 | rate as u64).wrapping_mul(0xd1b5_4a32_d192_ed03);
+        Self(Xoshiro256PlusPlus::seed_from_u64(number.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ !address))
     }
 
     fn normal(&mut self) -> f64 {

@@ -5,6 +5,7 @@ use kinematics::{Pose, Wheels, wrap_to_pi};
 
 use crate::model::Model;
 use crate::noise_shape::NoiseShape;
+use crate::recorded_rates::RateRounding;
 use crate::settings::{SPEED_CHANGE_RATIO, SPEED_CHANGE_WINDOW_S, TIME_TOLERANCE_S};
 use crate::wheel_angles::WheelInterval;
 use crate::wheel_rates::RateWindow;
@@ -51,6 +52,8 @@ pub struct Segment<'a> {
     /// What a count of each wheel stands for, radians; 0 where angles are not rounded.
     pub(crate) quantum_rad: Wheels<f64>,
     pub(crate) rate_window: RateWindow,
+    /// The rounding of recorded rates.
+    pub(crate) rate_rounding: RateRounding,
     /// Distance driven in the session before, metres, by nominal values.
     pub(crate) session_m: f64,
 }

@@ -52,6 +52,7 @@ mod tests {
             starts_within_row: false,
             interpolated_rad2: [Wheels::both(0.0); 2],
             restored_rad2: Wheels::both(0.0),
+            rate_steps: [0; 2],
         };
         let (slow, fast) = (Wheels::both(1.0), Wheels::both(3.0));
         let last = [fast, Wheels { left: 1.0, right: 3.0 }];

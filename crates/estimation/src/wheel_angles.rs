@@ -8,6 +8,7 @@
 use dataset::{NominalRobot, RestoredMotion, Run, RunView, WheelLog, row_jitter_s};
 use kinematics::{Count, Wheels};
 
+use crate::recorded_rates::{RateRounding, RateSteps, RecordedRates};
 use crate::settings::{MAX_EXTRAPOLATION, ROWS_OF_CHANGE, TIME_TOLERANCE_S};
 use crate::wheel_rates::{RateWindow, WheelRates, are_inexact, quantum_of_angles};
 
@@ -37,6 +38,8 @@ pub(crate) struct WheelInterval {
     pub(crate) interpolated_rad2: [Wheels<f64>; 2],
     /// Variance of each wheel's turn over it, rad², where its counts were lost and are restored; 0 elsewhere.
     pub(crate) restored_rad2: Wheels<f64>,
+    /// The row's recorded rates, where these are rounded.
+    pub(crate) rate_steps: RateSteps,
 }
 
 impl WheelInterval {
@@ -61,6 +64,7 @@ pub struct WheelAngleInterpolator<'a> {
     late_s: Vec<[f64; 2]>,
     /// Variances of the wheels' turns over the intervals of rows whose counts are restored, rad², by row.
     restored_rad2: Vec<(usize, Wheels<f64>)>,
+    recorded_rates: Option<RecordedRates>,
 }
 
 impl<'a> WheelAngleInterpolator<'a> {
@@ -79,6 +83,7 @@ impl<'a> WheelAngleInterpolator<'a> {
         }
         let mut first_rad = Wheels::both(0.0);
         let mut quantum_rad = Wheels::both(0.0);
+        let recorded_rates = RecordedRates::of(run, robot);
         let turn_rad = match &odometry.wheels {
             WheelLog::Ticks(ticks) => {
                 let rad = std::f64::consts::TAU / robot.ticks_per_rev?;
@@ -93,15 +98,10 @@ impl<'a> WheelAngleInterpolator<'a> {
                 angles.as_ref().map(|column| since_first(column, 1.0))
             }
             WheelLog::Speeds(_) | WheelLog::Twist { .. } => {
-                let m_per_rad = robot.geometry().ok()?.m_per_rad();
-                let mut turns = Wheels::both(vec![0.0]);
-                // A row's speeds hold over the interval that ends there.
-                for (row, t_s) in odometry.t_s.windows(2).enumerate() {
-                    let speed_rad_s = run.reported_speed_m_s(robot, row + 1)?.zip_with(m_per_rad, |v, r| v / r);
-                    turns = turns.zip_with(speed_rad_s, |mut turns: Vec<f64>, speed| {
-                        turns.push(turns[row] + speed * (t_s[1] - t_s[0]));
-                        turns
-                    });
+                let turns = run.angles_by_rates_rad(robot)?;
+                if recorded_rates.is_none() {
+                    // Of counts, by a driver that divides them by the time.
+                    quantum_rad = turns.as_ref().map(|column| quantum_of_angles(column));
                 }
                 turns
             }
@@ -120,7 +120,7 @@ impl<'a> WheelAngleInterpolator<'a> {
             row_jitter_s(&odometry.t_s).into_iter().map(|jitter_s| [-0.5 * jitter_s, 0.5 * jitter_s]).collect()
         };
         let restored_rad2 = restored_rad2(run.run(), &odometry.t_s, quantum_rad);
-        Some(Self { t_s: &odometry.t_s, turn_rad, first_rad, continuous, rates, late_s, restored_rad2 })
+        Some(Self { t_s: &odometry.t_s, turn_rad, first_rad, continuous, rates, late_s, restored_rad2, recorded_rates })
     }
 
     /// How both wheels turned from one instant to a later one, row by row, radians; `None` when the log does
@@ -177,6 +177,11 @@ impl<'a> WheelAngleInterpolator<'a> {
     #[must_use]
     pub const fn quantum_rad(&self) -> Wheels<f64> {
         self.rates.quantum_rad
+    }
+
+    /// How the recorded rates are rounded.
+    pub(crate) fn rate_rounding(&self) -> RateRounding {
+        self.recorded_rates.as_ref().map_or(RateRounding::default(), |rates| rates.rounding)
     }
 
     /// How the rates at the rows are found.
@@ -412,6 +417,8 @@ impl Cursor<'_, '_> {
                 stands,
                 starts_within_row,
                 interpolated_rad2,
+                // A row's rates hold over the interval that ends there.
+                rate_steps: self.track.recorded_rates.as_ref().map_or([0; 2], |rates| rates.at(row + 1)),
             });
             (at_s, angle) = (t_s, next);
         };

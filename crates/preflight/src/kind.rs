@@ -47,6 +47,8 @@ pub(crate) enum Kind {
     TruthOutlier { t_s: f64, distance_m: f64, rows: usize },
     /// Rates are of the instant, not of the interval.
     InstantRates,
+    /// Recorded rates are rounded to a step, m/s and rad/s, which is such a share of what wheels roll.
+    RoundedRates { step: f64, share: f64 },
     /// A gap within a log.
     Gap { t_s: f64, length_s: f64 },
     /// Rows are sent so many at a time.

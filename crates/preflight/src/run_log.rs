@@ -88,7 +88,7 @@ impl RunLog {
                 (angles, count_rad)
             }
             WheelLog::Angles(angles) => (angles.clone(), 0.0),
-            WheelLog::Speeds(_) | WheelLog::Twist { .. } => (rolled(&odometry.t_s, run, robot, false)?, 0.0),
+            WheelLog::Speeds(_) | WheelLog::Twist { .. } => (run.angles_by_rates_rad(robot)?, 0.0),
         };
         if odometry.t_s.is_empty() {
             return None;
@@ -123,7 +123,7 @@ impl RunLog {
     /// The wheels' angles if rates are of the instant.
     pub(crate) fn with_instant_rates(&self, run: &RunView<'_>, robot: &NominalRobot) -> Option<Self> {
         self.has_rates.then_some(())?;
-        Some(Self { wheels: rolled(&self.t_s, run, robot, true)?, ..self.clone() })
+        Some(Self { wheels: by_instant_rates_rad(&self.t_s, run, robot)?, ..self.clone() })
     }
 
     /// All times by a factor.
@@ -179,8 +179,8 @@ impl RunLog {
     }
 }
 
-/// Wheel angles by the nominal wheels from a log of speeds or twists.
-fn rolled(t_s: &[f64], run: &RunView<'_>, robot: &NominalRobot, of_instant: bool) -> Option<Wheels<Vec<f64>>> {
+/// Wheel angles by the nominal wheels from a log of speeds or twists of the rows' instants.
+fn by_instant_rates_rad(t_s: &[f64], run: &RunView<'_>, robot: &NominalRobot) -> Option<Wheels<Vec<f64>>> {
     let m_per_rad = robot.geometry().ok()?.m_per_rad();
     let rate = |row: usize| {
         let speed_m_s = run.reported_speed_m_s(robot, row)?;
@@ -190,8 +190,7 @@ fn rolled(t_s: &[f64], run: &RunView<'_>, robot: &NominalRobot, of_instant: bool
     let mut angles = Wheels { left: Vec::with_capacity(t_s.len()), right: Vec::with_capacity(t_s.len()) };
     for row in 0..t_s.len() {
         if row > 0 {
-            let now = rate(row)?;
-            let mean = if of_instant { now.zip_with(rate(row - 1)?, |a, b| 0.5 * (a + b)) } else { now };
+            let mean = rate(row)?.zip_with(rate(row - 1)?, |a, b| 0.5 * (a + b));
             angle = angle.zip_with(mean, |angle, rate| angle + rate * (t_s[row] - t_s[row - 1]));
         }
         angles.left.push(angle.left);

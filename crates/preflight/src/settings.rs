@@ -278,3 +278,11 @@ pub(crate) const GYRO_TURN_SIGMA_RAD: f64 = 0.01;
 /// Radians. Turn of a run below which a gyroscope tells the ratio of the wheels whatever its scale.
 /// Convention: a scale that is off by 5 % then errs by the standard deviation of its turn.
 pub(crate) const MAX_STRAIGHT_TURN_RAD: f64 = 0.2;
+
+/// Share of what wheels roll that rounded rates are off by, from which on it is said, and from which on a
+/// calibration is worse for it than people take it to be.
+/// Budgeted: wheels are calibrated to some 1e-4; a tyre's pressure changes them by 5e-4.
+pub(crate) const MIN_ROUNDED_SHARE: f64 = 1e-4;
+/// As said above.
+/// Budgeted: as said above.
+pub(crate) const MAX_ROUNDED_SHARE: f64 = 5e-4;

@@ -19,6 +19,7 @@ pub(crate) fn checked(dataset: &Dataset) -> SessionCheck {
     problems::wheels::found(&mut check);
     problems::truth_is_odometry::found(&mut check);
     problems::rates::found(&mut check, dataset);
+    problems::rounded_rates::found(&mut check, dataset);
     problems::coverage::found(&mut check);
     problems::coverage::unused(&mut check);
     check

@@ -30,6 +30,7 @@ pub(crate) const fn id(kind: &Kind) -> &'static str {
         Kind::CounterRestart { .. } => "counter_restart",
         Kind::TruthOutlier { .. } => "truth_outlier",
         Kind::InstantRates => "instant_rates",
+        Kind::RoundedRates { .. } => "rounded_rates",
         Kind::Gap { .. } => "log_gap",
         Kind::RowsInPackets { .. } => "rows_in_packets",
         Kind::LostRows { .. } => "lost_rows",
@@ -167,6 +168,10 @@ pub(crate) fn sentence(kind: &Kind, runs: Option<&[String]>) -> String {
         Kind::InstantRates => {
             "v_mps and omega_radps are of the instant; a row's rates are to be those of the interval that ends there; average each row with the one before".to_owned()
         }
+        Kind::RoundedRates { step, share } => format!(
+            "the recorded speeds are in steps of {step}: what a wheel rolls is known to {:.2} % while the robot drives evenly, and longer drives do not average that out; record counts, or more decimals",
+            100.0 * share
+        ),
         Kind::Gap { t_s, length_s } => format!(
             "the log has a gap of {length_s:.2} s after t = {} s; say continuous = false under its [[run]], or cut it there",
             to_ms(*t_s)

@@ -106,7 +106,7 @@ impl World {
         let mut samples = vec![Sample { at: self.at, wheels_rad: self.wheels_rad }];
         let mut now = [0.0, 0.0];
         let rest = |for_s| Part { v_m_s: 0.0, omega_rad_s: 0.0, for_s, rest_s: 0.0 };
-        let mut parts = vec![rest(0.5)];
+        let mut parts = vec![rest(0.5 + robot.stands_s)];
         for leg in legs {
             parts.push(*leg);
             if leg.rest_s > 0.0 {
@@ -114,7 +114,7 @@ impl World {
                 parts.push(rest((leg.v_m_s.abs() / limits[0]).max(leg.omega_rad_s.abs() / limits[1]) + leg.rest_s));
             }
         }
-        parts.push(rest(1.5));
+        parts.push(rest(1.5 + robot.stands_s));
         let mut t_s = 0.0;
         for part in parts {
             let target = [part.v_m_s, part.omega_rad_s];

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use super::draws::Draws;
 use super::drive::{Path1kHz, Sample};
-use super::{Event, PlainRobot, Reports, Stamps};
+use super::{Event, PlainRobot, Records, Reports, in_steps_of};
 
 impl PlainRobot {
     pub(super) fn of_run(&self, number: usize) -> impl Iterator<Item = Event> {
@@ -74,35 +74,58 @@ impl PlainRobot {
         let every = (1000.0 / self.odometry_hz).round() as usize;
         let offset = [draws.uniform(), draws.uniform()];
         let counted_rad = self.counted_rad(path, draws);
-        let (mut last_s, mut last_counts) = (f64::NEG_INFINITY, None);
-        for (row, step) in (self.first_step()..path.samples.len()).step_by(every).enumerate() {
+        let (mut last_s, mut last_counts, mut last_row) = (f64::NEG_INFINITY, None, None);
+        // How many rows of the packet are still to come.
+        let mut waits_for = self.rows_per_packet;
+        for step in (self.first_step()..path.samples.len()).step_by(every) {
             let is_lost = draws.uniform() < self.lost_rows;
             // Rows that are sent together have the stamp of the last of them.
-            let waits_for = self.rows_per_packet - 1 - row % self.rows_per_packet;
+            waits_for -= 1;
             let true_s = 1e-3 * (step + waits_for * every) as f64;
+            if waits_for == 0 {
+                let more = if self.more_rows_per_packet > 0 { draws.uniform() } else { 0.0 };
+                waits_for = self.rows_per_packet + (more * (1 + self.more_rows_per_packet) as f64) as usize;
+            }
             let true_s = true_s + self.clock_gain * (since_s + true_s);
             let stepped = self.of_run(number).filter_map(|event| match event {
                 Event::ClockStep { at_s, by_s } if true_s >= at_s => Some(by_s),
                 _ => None,
             });
             let true_s = true_s + stepped.sum::<f64>();
-            let stamp_s = match self.stamps {
-                Stamps::Exact => true_s,
-                Stamps::Jitter(sigma_s) => true_s + sigma_s * draws.normal(),
-                Stamps::Received(mean_s) => true_s - mean_s * (1.0 - draws.uniform()).ln(),
-                Stamps::RoundedTo(step_s) => (true_s / step_s).round() * step_s,
-            };
-            let stamp_s = stamp_s.max(last_s + 1e-4);
+            let stamp_s = self.stamps.of(true_s, draws).max(last_s + 1e-4);
             let read_at = [step, (step + (1e3 * self.right_late_s).round() as usize).min(path.samples.len() - 1)];
             let counts = [0, 1]
-                .map(|wheel| (counted_rad[read_at[wheel]][wheel] / TAU * self.ticks_per_rev + offset[wheel]).floor());
+                .map(|wheel| (counted_rad[read_at[wheel]][wheel] / TAU * self.ticks_per_rev + offset[wheel]).floor())
+                .map(|count| self.first_count + count);
             let is_unchanged = self.logs_changes_alone && last_counts == Some(counts);
+            // A row that is lost had the speed of its own time.
+            let row = (1e-3 * step as f64, counts);
+            let values = self.recorded(row, last_row.replace(row).unwrap_or((row.0 - 1e-3 * every as f64, counts)));
             if is_lost || is_unchanged {
                 continue;
             }
             (last_s, last_counts) = (stamp_s, Some(counts));
-            let [left, right] = counts;
+            let [left, right] = values;
             writeln!(odometry, "{id},{stamp_s:.6},{left},{right}").expect("text");
+        }
+    }
+
+    /// What a row says of its time and counts, and of those of the row before.
+    fn recorded(&self, (t_s, counts): (f64, [f64; 2]), (last_s, last_counts): (f64, [f64; 2])) -> [f64; 2] {
+        let rad = |count: f64| count / self.ticks_per_rev * TAU;
+        let speeds_m_s =
+            || [0, 1].map(|wheel| 0.08 * self.scale * rad(counts[wheel] - last_counts[wheel]) / (t_s - last_s));
+        match self.records {
+            Records::Counts => counts,
+            Records::Angles { step_rad } => counts.map(|count| in_steps_of(step_rad, rad(count))),
+            Records::Speeds { step_m_s } => speeds_m_s().map(|speed| in_steps_of(step_m_s, speed)),
+            Records::Twists { step_m_s, step_rad_s } => {
+                let [left, right] = speeds_m_s();
+                [
+                    in_steps_of(step_m_s, 0.5 * (left + right)),
+                    in_steps_of(step_rad_s, (right - left) / (0.363 * self.scale)),
+                ]
+            }
         }
     }
 
@@ -123,6 +146,7 @@ impl PlainRobot {
         let filtered = self.filtered(path);
         let mut jumped_at = [f64::NAN; 3];
         let mut correlated: Option<[f64; 3]> = None;
+        let mut last_s = f64::NEG_INFINITY;
         for step in steps {
             let t_s = 1e-3 * step as f64;
             let is_paused = self.truth_pause_s.is_some_and(|[from_s, to_s]| (from_s..to_s).contains(&t_s));
@@ -150,10 +174,17 @@ impl PlainRobot {
             if draws.happens(self.outliers) {
                 seen = [seen[0] + 0.1 * draws.normal(), seen[1] + 0.1 * draws.normal(), seen[2] + 0.1 * draws.normal()];
             }
-            let [x_m, y_m, theta_rad] = seen;
+            let [step_m, step_rad] = self.truth_steps;
+            let [x_m, y_m, theta_rad] =
+                [in_steps_of(step_m, seen[0]), in_steps_of(step_m, seen[1]), in_steps_of(step_rad, seen[2])];
             let theta_rad = if self.wraps { (theta_rad + PI).rem_euclid(TAU) - PI } else { theta_rad };
             let theta = if self.reports == Reports::Positions { String::new() } else { format!("{theta_rad:.9}") };
-            writeln!(truth, "{id},{t_s:.6},{x_m:.9},{y_m:.9},{theta}").expect("text");
+            for repeat in 0..self.truth_repeats {
+                let sent_s = t_s + repeat as f64 / (self.truth_repeats as f64 * self.truth_hz);
+                let stamp_s = self.truth_stamps.of(sent_s, draws).max(last_s + 1e-4);
+                last_s = stamp_s;
+                writeln!(truth, "{id},{stamp_s:.6},{x_m:.9},{y_m:.9},{theta}").expect("text");
+            }
         }
     }
 

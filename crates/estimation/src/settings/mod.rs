@@ -493,3 +493,13 @@ pub(crate) const MIN_NAMED_DIRECTION: f64 = 0.99;
 /// Length of what must be left of a unit direction beside those that the unobservable space is named after.
 /// Convention: more than 18° off them.
 pub(crate) const MIN_OWN_DIRECTION: f64 = 0.3;
+
+// Rounding of recorded rates.
+
+/// Recorded rates whose errors are shared, at the most.
+/// Budgeted: a pass each, which together take as long as some fits do.
+pub(crate) const MAX_SHARED_RATES: usize = 96;
+
+/// Median of the squares of standard normal numbers.
+/// Derived: the square of the quantile at 0.75.
+pub(crate) const MEDIAN_OF_NORMAL_SQUARES: f64 = 0.4549;

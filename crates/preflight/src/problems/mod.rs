@@ -7,6 +7,7 @@ pub(crate) mod ends;
 pub(crate) mod log_rows;
 pub(crate) mod rates;
 pub(crate) mod remedies;
+pub(crate) mod rounded_rates;
 pub(crate) mod several_robots;
 pub(crate) mod standstill;
 pub(crate) mod time_unit;

@@ -3,7 +3,7 @@
 use dataset::{MapDistortion, TruthSample, WheelLog};
 use nalgebra::{DMatrix, DVector};
 
-use crate::map_distortion::{MapShifts, OwnScatter};
+use crate::systematic_errors::{OwnScatter, SystematicErrors};
 use crate::{FitSettings, Information};
 
 /// Poses of SLAM of a robot that stands: no direction of its geometry is determined.
@@ -33,18 +33,18 @@ fn regress_a_fit_that_determines_nothing_has_no_map_to_add() {
 /// moves by I⁻¹ times the map's shift, whose coordinates are independent.
 #[test]
 fn a_map_moves_an_estimate_of_one_place_by_what_it_is_distorted_by_there() {
-    let dataset = super::dataset(true);
-    let records = crate::Records::of(&[dataset.session()]);
     // Of standard deviations that differ by two orders of magnitude.
     let inverse = DMatrix::from_row_slice(3, 3, &[4e-4, 1e-6, 2e-4, 1e-6, 9e-8, 0.0, 2e-4, 0.0, 1e-3]);
     let [sigma_xy_m, sigma_theta_rad] = [0.02, 0.01];
-    let distortion = MapDistortion { sigma_xy_m, sigma_theta_rad, length_m: 0.7 };
-    let of_place = |records: &crate::Records<'_>| {
+    let mut dataset = super::dataset(true);
+    dataset.truth_noise.map = Some(MapDistortion { sigma_xy_m, sigma_theta_rad, length_m: 0.7 });
+    let records = crate::Records::of(&[dataset.session()]);
+    let of_place = |records: &crate::Records<'_>, _| {
         let place = &records.segments[0].measurements[2];
         let gradient = DVector::from_row_slice(&[place.x_m, place.y_m, place.theta_rad.expect("measured")]);
         vec![Information { matrix: DMatrix::zeros(3, 3), gradient }]
     };
-    let shifts = MapShifts::of(&records, distortion, of_place);
+    let shifts = SystematicErrors::of(&records, of_place).expect("a map");
     let added = shifts.added_covariance(OwnScatter::NotCounted, &inverse);
     let shift = DMatrix::from_diagonal(&DVector::from_row_slice(&[
         sigma_xy_m * sigma_xy_m,

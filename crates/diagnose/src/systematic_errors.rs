@@ -1,9 +1,10 @@
-//! What is left of an effect once the errors of the instrument's map are counted.
+//! What is left of an effect once errors that do not average out are counted.
 //!
-//! A map's error at a place returns in every run. The likelihood takes it for the robot's, and neither
-//! innovations nor the scatter over runs show it. Where the map's distortion is stated, its covariance of an
-//! effect's size is known ([`estimation::ModelFit::covariance`]): an effect is one if it is significant
-//! beside that. Errors that last while the robot crosses a patch of the map are the map's own.
+//! A map's error at a place returns in every run, and so does the rounding of recorded rates wherever the
+//! robot drives as before. The likelihood takes it for the robot's, and neither innovations nor the scatter
+//! over runs show it. Its covariance of an effect's size is known ([`estimation::ModelFit::covariance`]): an
+//! effect is one if it is significant beside that. Errors that last while the robot crosses a patch of the
+//! map are the map's own.
 
 use effects::CATALOGUE;
 use estimation::{Column, ModelFit, RIDGE, inverse};
@@ -17,20 +18,22 @@ use crate::finding::Finding;
 use crate::settings::levels::{SCAN_LEVEL, SPARSE_TERM_LEVEL};
 use crate::statistics::p_of_chi_square;
 
-/// Leaves out what a stated distortion of the map explains: terms of `model` that are not significant beside
-/// it, and signs of errors that last. Sizes of the others get the standard deviations that the map leaves.
-pub(crate) fn without_map_errors(findings: &mut Vec<Finding>, base: &ModelFit<'_>, model: &AugmentedModel<'_>) {
-    if base.records.map.is_none() {
+/// Leaves out what systematic errors explain: terms of `model` that are not significant beside them, and
+/// signs of errors of the instrument beside a map or rates that are rounded by more. Sizes of the others get the standard deviations that they leave.
+pub(crate) fn without_systematic_errors(findings: &mut Vec<Finding>, base: &ModelFit<'_>, model: &AugmentedModel<'_>) {
+    if !base.has_systematic_errors() {
         return;
     }
     findings.retain_mut(|finding| {
         let (trials, level) = match finding.basis {
-            Basis::FailedTests(_) | Basis::Autocorrelated(..) => return false,
+            Basis::FailedTests(_) | Basis::Autocorrelated(..) => {
+                return base.records.map.is_none() && !base.rates_are_coarser_than_measurements();
+            }
             Basis::Products(trials) => (trials, SPARSE_TERM_LEVEL),
             _ => (CATALOGUE.len(), SCAN_LEVEL),
         };
         let Some(candidate) = finding.term.map(|term| &model.candidates[term]) else { return true };
-        let Some((p_value, covariance)) = beside_map(base, candidate) else { return false };
+        let Some((p_value, covariance)) = beside_errors(base, candidate) else { return false };
         for (k, parameter) in candidate.parameters().iter().enumerate() {
             if let Some(Value { sigma: Some(sigma), .. }) = finding.parameters.get_mut(parameter.name) {
                 *sigma = sigma.max(covariance[(k, k)].sqrt());
@@ -40,9 +43,9 @@ pub(crate) fn without_map_errors(findings: &mut Vec<Finding>, base: &ModelFit<'_
     });
 }
 
-/// The p-value of a candidate by the covariance that its size has with the map's, and that covariance; `None`
+/// The p-value of a candidate by the covariance that its size has with theirs, and that covariance; `None`
 /// where the fit with it diverges or has none.
-fn beside_map(base: &ModelFit<'_>, candidate: &Candidate) -> Option<(f64, DMatrix<f64>)> {
+fn beside_errors(base: &ModelFit<'_>, candidate: &Candidate) -> Option<(f64, DMatrix<f64>)> {
     let model = refit(base, &AugmentedModel::base(base), vec![candidate.clone()])?;
     let covariance = model.fit.covariance(&mut terms(&model.candidates))?;
     let at: Option<Vec<usize>> = model.range(0).map(|term| model.fit.position(Column::Term(term))).collect();

@@ -1,0 +1,69 @@
+//! The step that recorded rates are rounded to.
+//!
+//! Counts are rounded once: what one row leaves out the next one has. A rate that is rounded leaves out the
+//! same in each row for as long as the robot drives evenly: 0.5 mm/s, of a robot at 0.15 m/s, is 0.3 % of the
+//! distance.
+
+use std::collections::BTreeSet;
+
+use crate::record::WheelLog;
+use crate::settings::{DECIMAL_TOLERANCE, MAX_DECIMALS, MIN_DISTINCT_RATES};
+
+impl WheelLog {
+    /// The step that recorded speeds, or speed and yaw rate, are rounded to, m/s or rad/s: one, two or five in
+    /// the last decimal that any of them has. `None` for counts and angles, where values have more decimals
+    /// than `MAX_DECIMALS`, and where they are so few that the robot may have driven at these.
+    #[must_use]
+    pub fn recorded_step(&self) -> Option<f64> {
+        let columns = match self {
+            Self::Speeds(speeds) => [&speeds.left, &speeds.right],
+            Self::Twist { v_mps, omega_radps } => [v_mps, omega_radps],
+            Self::Ticks(_) | Self::Angles(_) => return None,
+        };
+        let values = || columns.into_iter().flatten().copied();
+        let is_whole = |value: f64| (value - value.round()).abs() <= DECIMAL_TOLERANCE;
+        let per_unit = (0..=MAX_DECIMALS)
+            .map(|decimals| 10_f64.powi(decimals))
+            .find(|of| values().all(|value| is_whole(value * of)))?;
+        let steps: BTreeSet<i64> = values().map(|value| (value * per_unit).round() as i64).collect();
+        if steps.len() < MIN_DISTINCT_RATES {
+            return None;
+        }
+        let multiple = [5, 2].into_iter().find(|multiple| steps.iter().all(|step| step % multiple == 0)).unwrap_or(1);
+        Some(multiple as f64 / per_unit)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use kinematics::Wheels;
+
+    use super::*;
+
+    /// A robot that speeds up by 14 mm/s a row, its speeds rounded.
+    fn speeds(step_m_s: f64) -> WheelLog {
+        let of = |share: f64| {
+            (0..60).map(|row| (0.013_731_9 * share * f64::from(row) / step_m_s).round() * step_m_s).collect()
+        };
+        WheelLog::Speeds(Wheels { left: of(1.0), right: of(-0.7) })
+    }
+
+    #[test]
+    fn the_step_is_that_of_the_last_decimal_of_any_value() {
+        for step_m_s in [1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 1e-4] {
+            let found = speeds(step_m_s).recorded_step().expect("rounded");
+            // A decimal fraction and its reciprocal are each rounded once.
+            assert!((found / step_m_s - 1.0).abs() < 1e-12, "{found} {step_m_s}");
+        }
+    }
+
+    #[test]
+    fn values_that_are_not_rounded_or_few_and_counts_have_none() {
+        assert_eq!(speeds(1e-7).recorded_step(), None);
+        assert_eq!(speeds(0.5).recorded_step(), None, "two speeds forward and one back");
+        let WheelLog::Speeds(Wheels { left, right }) = speeds(1e-2) else { panic!("speeds") };
+        assert_eq!(WheelLog::Angles(Wheels { left: left.clone(), right: right.clone() }).recorded_step(), None);
+        let third = left.iter().map(|speed| speed / 3.0).collect();
+        assert_eq!(WheelLog::Twist { v_mps: third, omega_radps: right }.recorded_step(), None);
+    }
+}
