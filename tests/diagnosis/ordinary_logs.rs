@@ -308,6 +308,20 @@ const KINDS: &[(&str, Change, &[&str])] = &[
         &[],
     ),
     ("rippled, counts at 20 Hz", |of| (of.odometry_hz, of.ripple) = (20.0, 0.03), &[]),
+    (
+        "poses at 30 Hz stamped in whole hundredths",
+        |of| {
+            (of.truth_hz, of.truth_stamps) = (30.0, Stamps::RoundedTo(1e-2));
+        },
+        &["unlisted"],
+    ),
+    (
+        "poses at 30 Hz stamped in whole milliseconds",
+        |of| {
+            (of.truth_hz, of.truth_stamps) = (30.0, Stamps::RoundedTo(1e-3));
+        },
+        &[],
+    ),
     ("counters that begin anywhere", |of| of.first_count = -123_456.0, &[]),
     (
         "packets of three to seven rows",
@@ -336,10 +350,10 @@ const KINDS: &[(&str, Change, &[&str])] = &[
     ),
     ("each pose five times", |of| of.truth_repeats = 5, &["truth_latency", "truth_correlated_noise"]),
     ("poses stamped with jitter of 5 ms", |of| of.truth_stamps = Stamps::Jitter(5e-3), &["unlisted"]),
-    ("poses received 10 ms late", |of| of.truth_stamps = Stamps::Received(1e-2), &["truth_latency", "unlisted"]),
+    // The longest of exponential delays are large errors.
     (
-        "poses received 30 ms late",
-        |of| of.truth_stamps = Stamps::Received(3e-2),
+        "poses received 10 ms late",
+        |of| of.truth_stamps = Stamps::Received(1e-2),
         &["truth_latency", "unlisted", "truth_outliers"],
     ),
     (
@@ -467,6 +481,14 @@ const UNLISTED: &[(&str, Change, &[&str])] = &[
     ("play of 2 mm", |of| of.gap_m = 2e-3, &["backlash"]),
     // A delay in the mean, that is less where the robot speeds up.
     ("truth filtered over 0.1 s", |of| of.truth_filter_s = 0.1, &["truth_latency"]),
+    // The lag of a filter is a delay but where the robot speeds up.
+    (
+        "filtered speeds at 20 Hz",
+        |of| {
+            (of.records, of.odometry_hz, of.speed_filter_s) = (Records::Speeds { step_m_s: 0.0 }, 20.0, 0.1);
+        },
+        &["truth_latency"],
+    ),
     ("a slippery patch", |of| of.slippery_band = Some([0.0, 0.6]), &["robot_displaced", "truth_jump"]),
     ("counts lost in bursts", |of| of.bursts_per_s = 0.02, &["robot_displaced", "truth_jump"]),
     (

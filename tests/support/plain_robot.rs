@@ -29,7 +29,8 @@ pub(crate) enum Reports {
     FirstAndLast,
 }
 
-/// What a row says of the wheels, nominal sizes taken; what is rounded beside the counts is so in these steps.
+/// What a row says of the wheels, nominal sizes taken; what is rounded beside the counts is so in these
+/// steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Records {
     Counts,
@@ -83,6 +84,8 @@ pub(crate) struct PlainRobot {
     pub(crate) odometry_hz: f64,
     pub(crate) stamps: Stamps,
     pub(crate) records: Records,
+    /// Time constant of the filter of recorded speeds.
+    pub(crate) speed_filter_s: f64,
     /// What the counters hold when a run begins.
     pub(crate) first_count: f64,
     pub(crate) truth_hz: f64,
@@ -207,6 +210,7 @@ impl PlainRobot {
             odometry_hz: 100.0,
             stamps: Stamps::Exact,
             records: Records::Counts,
+            speed_filter_s: 0.0,
             first_count: 0.0,
             truth_hz: 10.0,
             truth_stamps: Stamps::Exact,

@@ -63,8 +63,8 @@ impl Packets {
     }
 
     /// When rows were read that are sent some at a time. Where packets have as many rows each, it is found of
-    /// the packets' own stamps: `beat_of` them is their period, and what each of them is late by. `None` of any
-    /// other log.
+    /// the packets' own stamps: `beat_of` them is their period, and what each of them is late by. `None` of
+    /// any other log.
     pub(crate) fn read(t_s: &[f64], beat_of: impl FnOnce(&[f64]) -> Option<(f64, Vec<f64>)>) -> Option<Received> {
         let packets = Self::of(t_s)?;
         if let Some([first_s, period_s]) = packets.row_timing_s {

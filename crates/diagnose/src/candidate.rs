@@ -88,6 +88,11 @@ impl Candidate {
         self.is_of_instrument() || self.description().is_some_and(|description| description.is_clock_rate)
     }
 
+    /// Whether it is a delay to first order, whatever the robot drives.
+    pub(crate) fn is_delay(&self) -> bool {
+        self.description().is_some_and(|description| description.is_delay)
+    }
+
     /// Its held variant parameters.
     pub(crate) fn fixed(&self) -> Vec<(&'static str, f64)> {
         match self {

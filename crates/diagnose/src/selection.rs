@@ -8,7 +8,9 @@ use crate::candidate::Candidate;
 use crate::fit_cache::FitCache;
 use crate::gain::gain;
 use crate::likelihood_ratio::significant_once_refitted;
-use crate::model_comparison::{form_error_statistic, log_bayes_factor, log_odds_margin, log_odds_margin_of, regated};
+use crate::model_comparison::{
+    form_error_statistic, log_bayes_factor, log_odds_margin, log_odds_margin_of, margin_over_units, regated,
+};
 use crate::profile::fit_variant;
 use crate::ranking::{Entry, best_variants, tests_in};
 use crate::rivals::{Name, Refusal, Refusals, over_names, rivals};
@@ -194,6 +196,21 @@ fn is_not_discriminated(causes: &[(f64, f64)]) -> Vec<bool> {
     causes.iter().map(is_close).collect()
 }
 
+/// What two delays differ by is of second order, and a few runs with large errors decide it: where runs
+/// scatter by more than the margin, differences from the first cause count as shares of what they scatter by.
+fn scale_differences_of_delays(causes: &mut [(Name, AugmentedModel<'_>)]) {
+    let most = causes.iter().map(|(name, _)| name.explains).fold(f64::MIN, f64::max);
+    let Some(((first, first_model), others)) = causes.split_first_mut() else { return };
+    for (name, model) in others.iter_mut().filter(|(name, _)| name.candidate.is_delay() && first.candidate.is_delay()) {
+        let scatter = margin_over_units(0.0, first_model, model);
+        let scaled = |value: f64, largest: f64| {
+            let margin = log_odds_margin(largest);
+            largest - (largest - value) * (margin / scatter).min(1.0)
+        };
+        (name.log_odds, name.explains) = (scaled(name.log_odds, first.log_odds), scaled(name.explains, most));
+    }
+}
+
 /// Adds effects while the scan finds some. Then tests whether each is needed beside the others, and finds
 /// its possible causes. `known` is the cache of the same base.
 pub(crate) fn search<'a>(
@@ -252,6 +269,7 @@ pub(crate) fn search<'a>(
             model = without;
             continue;
         }
+        scale_differences_of_delays(&mut found);
         let odds: Vec<(f64, f64)> = found.iter().map(|(name, _)| (name.log_odds, name.explains)).collect();
         let mut kept = is_not_discriminated(&odds).into_iter();
         found.retain(|_| kept.next().unwrap_or(false));

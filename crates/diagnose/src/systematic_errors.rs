@@ -19,7 +19,8 @@ use crate::settings::levels::{SCAN_LEVEL, SPARSE_TERM_LEVEL};
 use crate::statistics::p_of_chi_square;
 
 /// Leaves out what systematic errors explain: terms of `model` that are not significant beside them, and
-/// signs of errors of the instrument beside a map or rates that are rounded by more. Sizes of the others get the standard deviations that they leave.
+/// signs of errors of the instrument beside a map or rates that are rounded by more. Sizes of the others get
+/// the standard deviations that they leave.
 pub(crate) fn without_systematic_errors(findings: &mut Vec<Finding>, base: &ModelFit<'_>, model: &AugmentedModel<'_>) {
     if !base.has_systematic_errors() {
         return;
@@ -66,8 +67,8 @@ mod tests {
 
     #[test]
     fn a_size_is_judged_by_its_whole_covariance() {
-        // Two sizes of variance 1 and correlation 0.8, estimated at (2, −2): 2·4/(1 − 0.8) = 40, which has
-        // the probability e^{−20} of two degrees of freedom. Rejects variances alone: 8, e^{−4}.
+        // Two sizes of variance 1 and correlation 0.8, estimated at (2, −2): 2·4/(1 − 0.8) = 40, which
+        // has the probability e^{−20} of two degrees of freedom. Rejects variances alone: 8, e^{−4}.
         let covariance = DMatrix::from_row_slice(2, 2, &[1.0, 0.8, 0.8, 1.0]);
         let p_value = p_of_size(&DVector::from_column_slice(&[2.0, -2.0]), &covariance);
         // The ridge changes the statistic by 1e-10.

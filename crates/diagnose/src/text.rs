@@ -160,9 +160,16 @@ fn basis(finding: &Finding) -> String {
             let Cause::Term(UnlistedTerm { channel, covariates, coefficient, sigma }) = finding.first() else {
                 return format!("not in the catalogue: the best of {trials} products tried");
             };
+            let covariates = covariates.join(" · ");
+            // As much as what a wheel gains in this time: what is logged of it is older.
+            let is_late = channel == "wheels" && covariates == "wheel acceleration" && *coefficient > 0.0;
+            let known = if is_late {
+                format!("; so is a log whose speeds are filtered, or that is late, by {coefficient:.3} s")
+            } else {
+                String::new()
+            };
             format!(
-                "not in the catalogue: {channel}, grows with {} ({coefficient:.3e} ± {sigma:.1e}); the best of {trials} products tried",
-                covariates.join(" · ")
+                "not in the catalogue: {channel}, grows with {covariates} ({coefficient:.3e} ± {sigma:.1e}); the best of {trials} products tried{known}"
             )
         }
         Basis::FailedTests(failed) => {

@@ -31,6 +31,8 @@ pub struct Description {
     pub shown_by_counts: Option<ShownByCounts>,
     /// Its parameter that is an offset of the instrument's clock, seconds; `None` where it has none.
     pub clock_offset: Option<&'static str>,
+    /// To first order it is a delay, whatever the robot drives.
+    pub is_delay: bool,
     /// It is the rate of a clock: its form is known as exactly as what an instrument does.
     pub is_clock_rate: bool,
     /// What of the instrument's mounting on the robot it changes; `None` where it changes none.
@@ -84,6 +86,7 @@ impl Description {
             restamped: None,
             shown_by_counts: None,
             clock_offset: None,
+            is_delay: false,
             is_clock_rate: false,
             extrinsic: None,
             geometry: None,

@@ -3,9 +3,9 @@
 //! A rate that is rounded is off by the same in each row for as long as the robot drives evenly, and by the
 //! same again whenever it drives so: an error that does not average out, as a ruler's. So rows that say the
 //! same of a rate, forward or backward, share its error, which is uniform over a step. Noise of the speeds is
-//! a dither: of standard deviation σ in steps it leaves e^{−2π²σ²} of what rows share, and the rest is another
-//! error in each (Widrow & Kollár 2008). The noise is that of fifth differences, of which smooth motion has
-//! none.
+//! a dither: of standard deviation σ in steps it leaves e^{−2π²σ²} of what rows share, and the rest is
+//! another error in each (Widrow & Kollár 2008). The noise is that of fifth differences, of which smooth
+//! motion has none.
 
 use std::f64::consts::TAU;
 
@@ -133,8 +133,8 @@ mod tests {
             let rounded = (0..4000).zip(noise).map(|(row, noise): (i32, f64)| (rate(row) + sigma * noise).round());
             noise_variance(&rounded.collect::<Vec<f64>>())
         };
-        // A quarter of the variance, which the median of 4000 squares says to a twentieth, and of dependent ones
-        // to a tenth. Rejects third differences, of which the ripple has 0.05 and more.
+        // A quarter of the variance, which the median of 4000 squares says to a twentieth, and of dependent
+        // ones to a tenth. Rejects third differences, of which the ripple has 0.05 and more.
         assert!(of(0.0) < 0.01);
         for sigma in [1.0, 3.0] {
             let share = of(sigma) / (sigma * sigma);

@@ -27,21 +27,25 @@ use crate::settings::MIN_RESIMULATED_VARIANCE_RATIO;
 use crate::wheel_angles::WheelInterval;
 
 impl ModelFit<'_> {
-    /// Has the rounding of counts or rates a part in what measurements are off by, so that the distributions of tests
-    /// depend on it?
+    /// Has the rounding of counts or rates, or what displacements share, a part in what measurements are off
+    /// by, so that the distributions of tests depend on it?
     #[must_use]
     pub fn depends_on_rounding(&self) -> bool {
         let [_, _, position_m2, heading_rad2] = self.solution.noise.variance;
         self.records.segments.iter().any(|segment| {
-            let of_counts = PoseVariance::of_rounding(segment.quantum_rad, &self.solution.model);
+            // A displacement has the error within a row where the one before ended, too.
+            let shared = segment.intervals.first().filter(|_| segment.continues);
+            let shared_rad2 = shared.map_or(Wheels::both(0.0), |first| first.interpolated_rad2[0]);
+            let at_ends_rad2 = segment.quantum_rad.zip_with(shared_rad2, |rad, shared| rad * rad / 12.0 + shared);
+            let at_ends = PoseVariance::of(at_ends_rad2, &self.solution.model);
             let [along_m2, turn_rad2] = segment.variance_of_rates(&self.solution.model);
-            of_counts.along_m2 + along_m2 > MIN_RESIMULATED_VARIANCE_RATIO * position_m2
-                || of_counts.heading_rad2 + turn_rad2 > MIN_RESIMULATED_VARIANCE_RATIO * heading_rad2
+            at_ends.along_m2 + along_m2 > MIN_RESIMULATED_VARIANCE_RATIO * position_m2
+                || at_ends.heading_rad2 + turn_rad2 > MIN_RESIMULATED_VARIANCE_RATIO * heading_rad2
         })
     }
 
-    /// Are rates rounded by more than the instrument errs by, where they stand? What is left of the measurements
-    /// says nothing of the instrument's errors then.
+    /// Are rates rounded by more than the instrument errs by, where they stand? What is left of the
+    /// measurements says nothing of the instrument's errors then.
     #[must_use]
     pub fn rates_are_coarser_than_measurements(&self) -> bool {
         let [_, _, position_m2, heading_rad2] = self.solution.noise.variance;
@@ -82,15 +86,19 @@ impl ModelFit<'_> {
         let mut records = self.records.copied();
         // What was measured beside the poses is of the motion that was driven, not of the one that is drawn.
         records.partial.iter_mut().filter(|of| of.has_poses()).for_each(|of| of.observations.clear());
-        let mut carried: Option<CarriedState> = None;
+        let mut carried: Option<(CarriedState, SharedErrors)> = None;
         for (index, segment) in records.segments.iter_mut().enumerate() {
             let mut draws = Draws::of(number, index);
             let smooth = smooth_turns(segment, &mut draws);
-            let mut rolled = self.rolled(segment, &smooth, &mut draws);
+            let (before, mut shared) = match carried.take().filter(|_| segment.continues) {
+                Some((before, shared)) => (Some(before), shared),
+                None => (None, SharedErrors::drawn(&mut draws)),
+            };
+            let mut rolled = self.rolled(segment, &smooth, &mut shared, &mut draws);
             unround_rates(&mut rolled, number, &mut draws);
-            let before = carried.take().filter(|_| segment.continues);
-            carried = Some(self.measure_again(segment, &rolled, index, before, terms, &mut draws));
-            count_again(segment, &smooth, &mut draws);
+            let after = self.measure_again(segment, &rolled, index, before, terms, &mut draws);
+            count_again(segment, &smooth, &mut shared);
+            carried = Some((after, shared));
         }
         let mut again = Self { records: Arc::new(records), ..self.clone() };
         again.solution.pass = Pass::nothing();
@@ -98,15 +106,19 @@ impl ModelFit<'_> {
     }
 
     /// The segment with what its wheels roll: the smoothed turns and the fitted noise of wheels and turns.
-    fn rolled<'a>(&self, segment: &Segment<'a>, smooth: &[Wheels<f64>], draws: &mut Draws) -> Segment<'a> {
+    fn rolled<'a>(
+        &self,
+        segment: &Segment<'a>,
+        smooth: &[Wheels<f64>],
+        shared: &mut SharedErrors,
+        draws: &mut Draws,
+    ) -> Segment<'a> {
         let Solution { model, noise, .. } = &self.solution;
         let [wheel, turn, ..] = noise.variance;
         let mut rolled = segment.clone();
-        // What nobody recorded of the motion within a row is one error for all of it.
-        let mut within_row = Wheels::both(0.0);
         for (interval, smooth) in rolled.intervals.iter_mut().zip(smooth) {
             if !interval.starts_within_row {
-                within_row = Wheels::from_sides(|_| draws.normal());
+                shared.within_row = Wheels::from_sides(|_| draws.normal());
             }
             let [from, to] = interval.interpolated_rad2.map(|variance| variance.map(f64::sqrt));
             let travel_m = model.m_per_rad.zip_with(*smooth, |m_per_rad, rad| m_per_rad * rad);
@@ -115,7 +127,7 @@ impl ModelFit<'_> {
             interval.wheel_rad = Wheels::from_sides(|side| {
                 let noise_m = (wheel * travel_m[side].abs()).sqrt() * draws.normal();
                 let sense = if side == Side::Left { -1.0 } else { 1.0 };
-                let bent_rad = within_row[side] * (to[side] - from[side]);
+                let bent_rad = shared.within_row[side] * (to[side] - from[side]);
                 let restored_rad2 = interval.restored_rad2[side];
                 let restored_rad = if restored_rad2 > 0.0 { restored_rad2.sqrt() * draws.normal() } else { 0.0 };
                 smooth[side] + bent_rad + restored_rad + (noise_m + sense * scrub_m) / model.m_per_rad[side]
@@ -168,6 +180,23 @@ impl ModelFit<'_> {
     }
 }
 
+/// Errors at the end of a segment, which a displacement that begins there has too.
+struct SharedErrors {
+    /// What nobody recorded of the motion within a row is one error for all of it, in standard deviations.
+    within_row: Wheels<f64>,
+    /// How much of the next count each wheel has turned.
+    count_share: Wheels<f64>,
+}
+
+impl SharedErrors {
+    fn drawn(draws: &mut Draws) -> Self {
+        Self {
+            within_row: Wheels::from_sides(|_| draws.normal()),
+            count_share: Wheels::from_sides(|_| draws.uniform()),
+        }
+    }
+}
+
 /// How the wheels turned by their rates, interval by interval: without the rounding of single rows. Between
 /// two rests the rates add up to whole counts, where a wheel stops anywhere between two.
 fn smooth_turns(segment: &Segment<'_>, draws: &mut Draws) -> Vec<Wheels<f64>> {
@@ -210,17 +239,17 @@ fn unround_rates(rolled: &mut Segment<'_>, number: u64, draws: &mut Draws) {
     }
 }
 
-/// Counts the smoothed turns at the ends of rows, each wheel from a random phase on. Within a row the counts
-/// go as the smoothed turns do, as those of a log are interpolated; rates have the rounding of the counts
-/// around them, as a log's have.
-fn count_again(segment: &mut Segment<'_>, smooth: &[Wheels<f64>], draws: &mut Draws) {
+/// Counts the smoothed turns at the ends of rows, each wheel from its share of a count on. Within a row the
+/// counts go as the smoothed turns do, as those of a log are interpolated; rates have the rounding of the
+/// counts around them, as a log's have.
+fn count_again(segment: &mut Segment<'_>, smooth: &[Wheels<f64>], shared: &mut SharedErrors) {
     let Some(start_s) = segment.intervals.first().map(|first| first.t_s) else { return };
     let mut rows_s = vec![start_s];
     let rounding_rad = Side::BOTH.map(|side| {
         let quantum_rad = segment.quantum_rad[side];
-        let phase = draws.uniform();
+        let count_share = shared.count_share[side];
         let counted = |turned_rad: f64| {
-            if quantum_rad > 0.0 { (turned_rad / quantum_rad + phase).floor() * quantum_rad } else { turned_rad }
+            if quantum_rad > 0.0 { (turned_rad / quantum_rad + count_share).floor() * quantum_rad } else { turned_rad }
         };
         let (mut turned_rad, mut before) = (0.0, counted(0.0));
         let mut rounding_rad = vec![before];
@@ -241,6 +270,9 @@ fn count_again(segment: &mut Segment<'_>, smooth: &[Wheels<f64>], draws: &mut Dr
             }
             rounding_rad.push(now - turned_rad);
             before = now;
+        }
+        if quantum_rad > 0.0 {
+            shared.count_share[side] = (turned_rad / quantum_rad + count_share).rem_euclid(1.0);
         }
         rounding_rad
     });
@@ -320,8 +352,8 @@ mod tests {
         let turned: Vec<Wheels<f64>> = (0..400).map(of_draw).collect();
         let mean = turned.iter().map(|of| of.left).sum::<f64>() / 400.0;
         let variance = turned.iter().map(|of| (of.left - mean).powi(2)).sum::<f64>() / 399.0;
-        // The difference of two uniform phases has the variance q²/6, a standard error of 6 % of it over 400,
-        // and their mean one of 4e-3. Rejects whole counts, and the phase of one end alone.
+        // The difference of two uniform phases has the variance q²/6, a standard error of 6 % of it over
+        // 400, and their mean one of 4e-3. Rejects whole counts, and the phase of one end alone.
         assert!((variance / (0.2 * 0.2 / 6.0) - 1.0).abs() < 0.24, "{variance}");
         let by_rates = |of: &WheelInterval| {
             let [start, end] = of.rate_at_ends_rad_s;
@@ -342,7 +374,7 @@ mod tests {
             (interval.rate_rad_s, interval.rate_at_ends_rad_s) = (Wheels::both(2.8), [Wheels::both(2.8); 2]);
         }
         let smooth: Vec<Wheels<f64>> = segment.intervals.iter().map(|of| Wheels::both(2.8 * of.dt_s)).collect();
-        count_again(&mut segment, &smooth, &mut Draws::of(1, 0));
+        count_again(&mut segment, &smooth, &mut SharedErrors::drawn(&mut Draws::of(1, 0)));
         let (mut t_s, mut counted_rad) = (vec![segment.intervals[0].t_s], vec![0.0]);
         for interval in &segment.intervals {
             t_s.push(interval.t_s + interval.dt_s);
@@ -358,5 +390,23 @@ mod tests {
             varied += usize::from((rates[k] - 2.8).abs() > 1e-3);
         }
         assert!(half > 0 && varied > 100, "{half} {varied}");
+    }
+
+    #[test]
+    fn counts_go_on_from_a_displacement_to_the_next() {
+        let dataset = dataset();
+        let records = Records::of(&[dataset.session()]);
+        let segment = &records.segments[0];
+        let smooth: Vec<Wheels<f64>> = segment.intervals.iter().map(|of| Wheels::both(2.8 * of.dt_s)).collect();
+        let turned_rad: f64 = smooth.iter().map(|of| of.left).sum();
+        let mut shared = SharedErrors::drawn(&mut Draws::of(1, 0));
+        let mut off_rad = 0.0_f64;
+        for _ in 0..20 {
+            let mut next = segment.clone();
+            count_again(&mut next, &smooth, &mut shared);
+            off_rad += next.intervals.iter().map(|of| of.wheel_rad.left).sum::<f64>() - turned_rad;
+            // A count is 0.2 rad. Rejects phases of their own, by which twenty are off by more than that.
+            assert!(off_rad.abs() < 0.2, "{off_rad}");
+        }
     }
 }

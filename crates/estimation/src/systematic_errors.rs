@@ -4,8 +4,8 @@
 //! The map's error at a place is the same whenever the robot is there, and that of a rounded rate whenever it
 //! is recorded ([`crate::recorded_rates`]), in every run: neither whiteness of innovations nor scatter
 //! over runs shows it. The fit is linear in what was recorded near its solution. So each function of which
-//! the distortion is made ([`map_functions`]), and the error of each recorded rate, shifts the records, one pass
-//! gives the gradients, and I⁻¹ (Σ g gᵀ) I⁻¹ is the covariance that all of them make.
+//! the distortion is made ([`map_functions`]), and the error of each recorded rate, shifts the records, one
+//! pass gives the gradients, and I⁻¹ (Σ g gᵀ) I⁻¹ is the covariance that all of them make.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -75,6 +75,7 @@ impl PlainRobot {
         let offset = [draws.uniform(), draws.uniform()];
         let counted_rad = self.counted_rad(path, draws);
         let (mut last_s, mut last_counts, mut last_row) = (f64::NEG_INFINITY, None, None);
+        let mut filtered_m_s = [0.0; 2];
         // How many rows of the packet are still to come.
         let mut waits_for = self.rows_per_packet;
         for step in (self.first_step()..path.samples.len()).step_by(every) {
@@ -100,7 +101,12 @@ impl PlainRobot {
             let is_unchanged = self.logs_changes_alone && last_counts == Some(counts);
             // A row that is lost had the speed of its own time.
             let row = (1e-3 * step as f64, counts);
-            let values = self.recorded(row, last_row.replace(row).unwrap_or((row.0 - 1e-3 * every as f64, counts)));
+            let since = last_row.replace(row).unwrap_or((row.0 - 1e-3 * every as f64, counts));
+            let share =
+                if self.speed_filter_s > 0.0 { 1.0 - (-1e-3 * every as f64 / self.speed_filter_s).exp() } else { 1.0 };
+            let now_m_s = self.speeds_m_s(row, since);
+            filtered_m_s = [0, 1].map(|wheel| filtered_m_s[wheel] + share * (now_m_s[wheel] - filtered_m_s[wheel]));
+            let values = self.recorded(counts, filtered_m_s);
             if is_lost || is_unchanged {
                 continue;
             }
@@ -110,22 +116,22 @@ impl PlainRobot {
         }
     }
 
-    /// What a row says of its time and counts, and of those of the row before.
-    fn recorded(&self, (t_s, counts): (f64, [f64; 2]), (last_s, last_counts): (f64, [f64; 2])) -> [f64; 2] {
-        let rad = |count: f64| count / self.ticks_per_rev * TAU;
-        let speeds_m_s =
-            || [0, 1].map(|wheel| 0.08 * self.scale * rad(counts[wheel] - last_counts[wheel]) / (t_s - last_s));
+    /// Speeds of the wheels by the times and counts of two rows.
+    fn speeds_m_s(&self, (t_s, counts): (f64, [f64; 2]), (last_s, last_counts): (f64, [f64; 2])) -> [f64; 2] {
+        let m_per_count = 0.08 * self.scale * TAU / self.ticks_per_rev;
+        [0, 1].map(|wheel| m_per_count * (counts[wheel] - last_counts[wheel]) / (t_s - last_s))
+    }
+
+    /// What a row says of its counts and of speeds of the wheels.
+    fn recorded(&self, counts: [f64; 2], [left_m_s, right_m_s]: [f64; 2]) -> [f64; 2] {
         match self.records {
             Records::Counts => counts,
-            Records::Angles { step_rad } => counts.map(|count| in_steps_of(step_rad, rad(count))),
-            Records::Speeds { step_m_s } => speeds_m_s().map(|speed| in_steps_of(step_m_s, speed)),
-            Records::Twists { step_m_s, step_rad_s } => {
-                let [left, right] = speeds_m_s();
-                [
-                    in_steps_of(step_m_s, 0.5 * (left + right)),
-                    in_steps_of(step_rad_s, (right - left) / (0.363 * self.scale)),
-                ]
-            }
+            Records::Angles { step_rad } => counts.map(|count| in_steps_of(step_rad, count / self.ticks_per_rev * TAU)),
+            Records::Speeds { step_m_s } => [left_m_s, right_m_s].map(|speed| in_steps_of(step_m_s, speed)),
+            Records::Twists { step_m_s, step_rad_s } => [
+                in_steps_of(step_m_s, 0.5 * (left_m_s + right_m_s)),
+                in_steps_of(step_rad_s, (right_m_s - left_m_s) / (0.363 * self.scale)),
+            ],
         }
     }
 

@@ -78,6 +78,13 @@ fn a_term_and_failed_tests_are_said_by_themselves() {
     let cause = Cause::Term(term);
     let of_term = "not in the catalogue: yaw, grows with v · omega (1.250e-2 ± 1.0e-3); the best of 300 products tried";
     assert_eq!(said(Basis::Products(300), std::slice::from_ref(&cause), &[]), of_term);
+    let late = |channel: &str, coefficient: f64| {
+        let covariates = vec!["wheel acceleration".to_owned()];
+        let term = UnlistedTerm { channel: channel.to_owned(), covariates, coefficient, sigma: 0.001 };
+        said(Basis::Products(300), &[Cause::Term(term)], &[])
+    };
+    assert!(late("wheels", 0.077).ends_with("; so is a log whose speeds are filtered, or that is late, by 0.077 s"));
+    assert!(!late("wheels", -0.077).contains("filtered") && !late("left_wheel", 0.077).contains("filtered"));
     let unknown = "not in the catalogue: the best of 300 products tried";
     assert_eq!(said(Basis::Products(300), &[Cause::Unknown], &[]), unknown);
     let names = [found(Basis::Products(300), &[cause], &[]), found(Basis::Mean, &[SLIP, CASTOR], &[])];

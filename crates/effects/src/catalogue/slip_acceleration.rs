@@ -68,6 +68,7 @@ impl PhysicalEffect for SlipAcceleration {
                     })
                 },
             ),
+            is_delay: true,
             on_board: ON_BOARD,
             ..Description::of(MEANING)
         }

@@ -47,6 +47,7 @@ impl PhysicalEffect for TruthLatency {
     fn description() -> Description {
         Description {
             clock_offset: Some("delay_s"),
+            is_delay: true,
             summary: Summary::WithValues(|values| {
                 format!("{MEANING} by {}: nothing is wrong with the robot", values.shown("delay_s", 1e3, "ms"))
             }),

@@ -8,6 +8,7 @@ mod driving;
 mod map;
 mod partial;
 mod poses_between_rows;
+mod recorded_rates;
 mod start_headings;
 mod thinning;
 
@@ -22,6 +23,7 @@ pub(crate) use partial::{
     WALL_START_DIRECTIONS, WALL_START_STEPS,
 };
 pub(crate) use poses_between_rows::{MAX_INTERPOLATED_VARIANCE_RATIO, MAX_SHARED_VARIANCE_RATIO, MIN_POSES_NEAR_ROWS};
+pub(crate) use recorded_rates::{MAX_SHARED_RATES, MEDIAN_OF_NORMAL_SQUARES};
 pub(crate) use start_headings::{HEADING_STEP_TOLERANCE_RAD, START_HEADING_BASELINE_M, START_HEADING_PRECISION};
 pub(crate) use thinning::{MIN_MEASUREMENTS_PER_RUN, SPACING_SLACK, THINNING_FACTOR, THINNING_PHASES};
 
@@ -493,13 +495,3 @@ pub(crate) const MIN_NAMED_DIRECTION: f64 = 0.99;
 /// Length of what must be left of a unit direction beside those that the unobservable space is named after.
 /// Convention: more than 18° off them.
 pub(crate) const MIN_OWN_DIRECTION: f64 = 0.3;
-
-// Rounding of recorded rates.
-
-/// Recorded rates whose errors are shared, at the most.
-/// Budgeted: a pass each, which together take as long as some fits do.
-pub(crate) const MAX_SHARED_RATES: usize = 96;
-
-/// Median of the squares of standard normal numbers.
-/// Derived: the square of the quantile at 0.75.
-pub(crate) const MEDIAN_OF_NORMAL_SQUARES: f64 = 0.4549;

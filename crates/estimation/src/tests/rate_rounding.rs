@@ -27,8 +27,8 @@ fn straights() -> Dataset {
     dataset
 }
 
-/// Each wheel's rates have errors of their own, the same in every run: ten of 18 rows have that of 99 mm/s, and
-/// each of eight others that of its speed.
+/// Each wheel's rates have errors of their own, the same in every run: ten of 18 rows have that of 99 mm/s,
+/// and each of eight others that of its speed.
 #[test]
 fn a_rate_that_is_rounded_leaves_a_wheel_uncertain_however_often_it_is_driven() {
     let sigma = |dataset: &Dataset| {
