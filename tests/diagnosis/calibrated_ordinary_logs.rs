@@ -12,7 +12,7 @@ use std::process::Command;
 use rayon::prelude::*;
 use serde_json::Value;
 
-use crate::ordinary_logs::{Change, kinds, robots};
+use crate::ordinary_kinds::{Change, kinds, robots};
 use crate::plain_robot::PlainRobot;
 
 /// Both wheels' diameters and their separation.

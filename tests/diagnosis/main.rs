@@ -10,6 +10,7 @@ mod large_log;
 #[path = "../support/motion_capture.rs"]
 mod motion_capture;
 mod nested_gain;
+mod ordinary_kinds;
 mod ordinary_logs;
 #[path = "../support/plain_robot.rs"]
 mod plain_robot;
