@@ -322,13 +322,13 @@ const KINDS: &[(&str, Change, &[&str])] = &[
     ),
 ];
 
-/// Kinds that are asked in campaigns alone, where YAIR_ROBOTS is set: others are like them.
+/// Kinds that are asked where YAIR_ROBOTS or YAIR_KIND is set alone: others are like them.
 const IN_CAMPAIGNS: [&str; 3] = ["rippled", "cm/s", "two decimals"];
 
 /// Kinds whose name has the text of YAIR_KIND in it; all without.
 pub(crate) fn kinds() -> impl Iterator<Item = &'static (&'static str, Change, &'static [&'static str])> {
     let of = std::env::var("YAIR_KIND").unwrap_or_default();
-    let is_campaign = std::env::var_os("YAIR_ROBOTS").is_some();
+    let is_campaign = ["YAIR_ROBOTS", "YAIR_KIND"].iter().any(|name| std::env::var_os(name).is_some());
     let is_asked = move |name: &str| is_campaign || !IN_CAMPAIGNS.iter().any(|part| name.contains(part));
     KINDS.iter().filter(move |(name, ..)| name.contains(&of) && is_asked(name))
 }

@@ -51,7 +51,7 @@ pub(crate) fn lateness_of_ticks(numbers: &[i64], late_s: &[f64]) -> Vec<f64> {
 
 /// Sums of a line through points.
 #[derive(Default)]
-struct Sums {
+pub(crate) struct Sums {
     count: f64,
     x: f64,
     y: f64,
@@ -60,7 +60,7 @@ struct Sums {
 }
 
 impl Sums {
-    fn add(&mut self, (x, y): (f64, f64), times: f64) {
+    pub(crate) fn add(&mut self, (x, y): (f64, f64), times: f64) {
         self.count += times;
         self.x += times * x;
         self.y += times * y;
@@ -69,7 +69,7 @@ impl Sums {
     }
 
     /// The line at a point; the mean where it has no slope.
-    fn line_at(&self, x: f64) -> f64 {
+    pub(crate) fn line_at(&self, x: f64) -> f64 {
         let (mean_x, mean_y) = (self.x / self.count, self.y / self.count);
         let square = self.xx - self.count * mean_x * mean_x;
         let slope = if square > 0.5 * self.count { (self.xy - self.count * mean_x * mean_y) / square } else { 0.0 };

@@ -8,6 +8,7 @@
 
 use std::ops::Range;
 
+use crate::lateness::Sums;
 use crate::receipt_delays::{Received, rows_on_heels};
 
 /// Share of the packets that have as many rows at the least, and of those that have more at the most: a row
@@ -96,17 +97,17 @@ impl Packets {
 /// The line through the stamps of the packets' last rows on their numbers: the time of row 0 and the rows'
 /// period, seconds; `None` where packets are off it.
 fn row_timing_s(packets: &[Range<usize>], t_s: &[f64]) -> Option<[f64; 2]> {
-    let last = || packets.iter().map(|packet| ((packet.end - 1) as f64, t_s[packet.end - 1]));
-    let count = packets.len() as f64;
-    let (rows, seconds) = last().fold((0.0, 0.0), |(rows, seconds), (row, sent_s)| (rows + row, seconds + sent_s));
-    let (middle_row, middle_s) = (rows / count, seconds / count);
-    let (products, squares) = last().fold((0.0, 0.0), |(products, squares), (row, sent_s)| {
-        (products + (row - middle_row) * (sent_s - middle_s), squares + (row - middle_row).powi(2))
-    });
-    let period_s = products / squares;
-    let first_s = middle_s - period_s * middle_row;
-    let squares_s2: f64 = last().map(|(row, sent_s)| (sent_s - first_s - period_s * row).powi(2)).sum();
-    ((squares_s2 / count).sqrt() <= MAX_OFF * period_s).then_some([first_s, period_s])
+    let [first, .., last] = packets else { return None };
+    let rows = (last.end - first.end) as f64;
+    let mean_period_s = (t_s[last.end - 1] - t_s[first.end - 1]) / rows;
+    // Times over numbers stay small for precision.
+    let sent = || packets.iter().map(|packet| (packet.end - 1) as f64).zip(packets.iter().map(|of| t_s[of.end - 1]));
+    let mut line = Sums::default();
+    sent().for_each(|(row, sent_s)| line.add((row, sent_s - mean_period_s * row), 1.0));
+    let first_s = line.line_at(0.0);
+    let period_s = mean_period_s + (line.line_at(rows) - first_s) / rows;
+    let squares_s2: f64 = sent().map(|(row, sent_s)| (sent_s - first_s - period_s * row).powi(2)).sum();
+    ((squares_s2 / packets.len() as f64).sqrt() <= MAX_OFF * period_s).then_some([first_s, period_s])
 }
 
 /// How many rows come at a time, usually, where a log's rows are kept and sent in packets; by stamps that do

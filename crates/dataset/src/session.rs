@@ -141,9 +141,9 @@ impl<'a> RunView<'a> {
     }
 
     /// Wheel angles at the rows by the nominal geometry, radians since the first, of a robot that reports
-    /// speeds or its twist: a row's speeds hold over the interval that ends there. Where rows are missing on
-    /// a regular beat, they hold over the last beat; before it the wheels went on from the speeds of the row
-    /// before, half of the time for each as speeds change steadily.
+    /// speeds or its twist: a row's speeds hold over the interval that ends there. Where rows are missing,
+    /// they hold over the last sampling period; before it the wheels went on from the speeds of the row
+    /// before, which change steadily.
     #[must_use]
     pub fn angles_by_rates_rad(&self, robot: &NominalRobot) -> Option<Wheels<Vec<f64>>> {
         let m_per_rad = robot.geometry().ok()?.m_per_rad();

@@ -48,6 +48,12 @@ pub(crate) fn odds_within(difference: f64, margin: f64) -> f64 {
     (difference * MIN_LOG_ODDS_MARGIN / margin).exp()
 }
 
+/// Log odds whose difference from the best counts as a share of so much scatter, where that is more than the
+/// margin: a difference of the scatter is one of the margin.
+pub(crate) fn with_scaled_difference(log_odds: f64, best: f64, scatter: f64) -> f64 {
+    best - (best - log_odds) * (log_odds_margin(best) / scatter).min(1.0)
+}
+
 /// Log Bayes factor of a model over its base.
 pub(crate) fn log_bayes_factor(base: &ModelFit<'_>, model: &AugmentedModel<'_>) -> f64 {
     let count_of_both = count(base).max(count(&model.fit));
@@ -111,6 +117,15 @@ mod tests {
         assert!((relative_odds(98.0, 100.0) - (-2.0_f64).exp()).abs() < 1e-12);
         // Of 1000 the margin is 10: 20 below it are e⁻⁶.
         assert!((relative_odds(980.0, 1000.0) - (-6.0_f64).exp()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_difference_of_the_scatter_is_one_of_the_margin() {
+        // 24 below 1000, whose margin is 10, at a scatter of 24; half of it at 48. Rejects shares of 3.
+        assert!((with_scaled_difference(976.0, 1000.0, 24.0) - 990.0).abs() < 1e-12);
+        assert!((with_scaled_difference(976.0, 1000.0, 48.0) - 995.0).abs() < 1e-12);
+        // Runs that scatter by less make no difference larger.
+        assert_eq!(with_scaled_difference(976.0, 1000.0, 3.0), 976.0);
     }
 
     #[test]

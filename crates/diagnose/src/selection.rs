@@ -10,6 +10,7 @@ use crate::gain::gain;
 use crate::likelihood_ratio::significant_once_refitted;
 use crate::model_comparison::{
     form_error_statistic, log_bayes_factor, log_odds_margin, log_odds_margin_of, margin_over_units, regated,
+    with_scaled_difference,
 };
 use crate::profile::fit_variant;
 use crate::ranking::{Entry, best_variants, tests_in};
@@ -203,11 +204,8 @@ fn scale_differences_of_delays(causes: &mut [(Name, AugmentedModel<'_>)]) {
     let Some(((first, first_model), others)) = causes.split_first_mut() else { return };
     for (name, model) in others.iter_mut().filter(|(name, _)| name.candidate.is_delay() && first.candidate.is_delay()) {
         let scatter = margin_over_units(0.0, first_model, model);
-        let scaled = |value: f64, largest: f64| {
-            let margin = log_odds_margin(largest);
-            largest - (largest - value) * (margin / scatter).min(1.0)
-        };
-        (name.log_odds, name.explains) = (scaled(name.log_odds, first.log_odds), scaled(name.explains, most));
+        name.log_odds = with_scaled_difference(name.log_odds, first.log_odds, scatter);
+        name.explains = with_scaled_difference(name.explains, most, scatter);
     }
 }
 

@@ -17,9 +17,8 @@ impl ModelFit<'_> {
     /// there are beyond the parameters (cluster-robust, with the leverage of each run; Liang & Zeger 1986;
     /// Bell & McCaffrey 2002). Both add like variances that are known from so many runs each. A run that
     /// alone shows a parameter says nothing of its scatter; blocks of a run do not count, as what one leaves
-    /// goes on in the next. A stated distortion of the map adds to it, and so
-    /// does the rounding of recorded rates. `terms` are those of the fit. `None`
-    /// where rounding is all that there is of it.
+    /// goes on in the next. A stated distortion of the map adds to it, and so does the rounding of recorded
+    /// rates. `terms` are those of the fit. `None` where rounding is all that there is of it.
     #[must_use]
     pub fn covariance(&self, terms: &mut [Box<dyn ModelTerm>]) -> Option<DMatrix<f64>> {
         let free = self.free_basis();
@@ -45,8 +44,11 @@ impl ModelFit<'_> {
             robust = with_systematic(robust, OwnScatter::Counted);
             along = (robust * spare + along * INFORMATION_WEIGHT_RUNS) / (spare + INFORMATION_WEIGHT_RUNS);
         }
-        let whole = &free * along * free.transpose();
-        with_variances(self.by_systematic_errors.as_ref().map_or(whole.clone(), |added| whole + added))
+        let mut whole = &free * along * free.transpose();
+        if let Some(added) = &self.by_systematic_errors {
+            whole += added;
+        }
+        with_variances(whole)
     }
 
     /// What systematic errors add to the covariance of the free columns; `None` where there are none.

@@ -12,7 +12,7 @@ use std::f64::consts::TAU;
 use dataset::{NominalRobot, RunView, WheelLog};
 use kinematics::{Twist, Wheels};
 
-use crate::settings::MEDIAN_OF_NORMAL_SQUARES;
+use crate::settings::CHI_SQUARE_1_MEDIAN;
 
 /// What a row says of both rates, in whole steps; 0 at rest, and where nothing is rounded.
 pub(crate) type RateSteps = [i32; 2];
@@ -20,8 +20,8 @@ pub(crate) type RateSteps = [i32; 2];
 /// The rounded rates of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct RecordedRates {
-    /// By row.
-    steps: Vec<RateSteps>,
+    /// Each rate's, by row.
+    steps: [Vec<i32>; 2],
     pub(crate) rounding: RateRounding,
 }
 
@@ -40,7 +40,7 @@ impl RecordedRates {
         let wheels = &run.odometry().wheels;
         let step = wheels.recorded_step()?;
         let geometry = robot.geometry().ok()?;
-        let ([first, second], of_step_m_s) = match wheels {
+        let (columns, of_step_m_s) = match wheels {
             WheelLog::Speeds(speeds) => {
                 ([&speeds.left, &speeds.right], [Wheels { left: step, right: 0.0 }, Wheels { left: 0.0, right: step }])
             }
@@ -51,22 +51,19 @@ impl RecordedRates {
             ),
             WheelLog::Ticks(_) | WheelLog::Angles(_) => return None,
         };
-        let in_steps = |rate: &f64| (rate / step).round() as i32;
+        let steps = columns.map(|column| column.iter().map(|rate| (rate / step).round() as i32).collect());
         Some(Self {
-            steps: first.iter().zip(second).map(|(first, second)| [in_steps(first), in_steps(second)]).collect(),
             rounding: RateRounding {
-                shared: [first, second].map(|column| {
-                    let steps: Vec<f64> = column.iter().map(|rate| (rate / step).round()).collect();
-                    (-0.5 * TAU * TAU * noise_variance(&steps)).exp()
-                }),
+                shared: steps.each_ref().map(|steps: &Vec<i32>| (-0.5 * TAU * TAU * noise_variance(steps)).exp()),
                 step_rad_s: of_step_m_s.map(|of| of.zip_with(geometry.m_per_rad(), |m_s, m_per_rad| m_s / m_per_rad)),
             },
+            steps,
         })
     }
 
     /// Of a row.
     pub(crate) fn at(&self, row: usize) -> RateSteps {
-        self.steps.get(row).copied().unwrap_or_default()
+        self.steps.each_ref().map(|steps| steps.get(row).copied().unwrap_or_default())
     }
 }
 
@@ -74,13 +71,16 @@ impl RecordedRates {
 /// differences in motion, by the median of their squares, as those of a robot that sets off are large. Speeds
 /// that are made of counts have the rounding of two counts: its differences are those of nearly twice its
 /// variance, and it is on a grid, which dithers less. A quarter counts.
-fn noise_variance(steps: &[f64]) -> f64 {
-    let in_motion = steps.windows(6).filter(|of| of.iter().any(|step| *step != 0.0));
-    let fifth = |of: &[f64]| of[5] - 5.0 * of[4] + 10.0 * of[3] - 10.0 * of[2] + 5.0 * of[1] - of[0];
+fn noise_variance(steps: &[i32]) -> f64 {
+    let in_motion = steps.windows(6).filter(|of| of.iter().any(|step| *step != 0));
+    let fifth = |of: &[i32]| {
+        let weights = [-1.0, 5.0, -10.0, 10.0, -5.0, 1.0];
+        of.iter().zip(weights).map(|(step, weight)| weight * f64::from(*step)).sum::<f64>()
+    };
     let mut squares: Vec<f64> = in_motion.map(|of| fifth(of).powi(2)).collect();
     squares.sort_unstable_by(f64::total_cmp);
     let middle = squares.get(squares.len() / 2).copied().unwrap_or(0.0);
-    0.25 * f64::max(middle / MEDIAN_OF_NORMAL_SQUARES / 252.0 - 1.0 / 12.0, 0.0)
+    0.25 * f64::max(middle / CHI_SQUARE_1_MEDIAN / 252.0 - 1.0 / 12.0, 0.0)
 }
 
 /// What rows say of one of both rates, without its sign: drives and their reverses have the same wheels, and
@@ -117,7 +117,7 @@ impl RateRounding {
 
 #[cfg(test)]
 mod tests {
-    use rand::{RngExt, SeedableRng};
+    use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
     use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -130,8 +130,9 @@ mod tests {
             // A ripple of 9 steps in a dozen rows, about half of a step.
             let rate = |row: i32| 150.37 + 9.0 * (0.53 * f64::from(row)).sin();
             let noise: Vec<f64> = (0..4000).map(|_| StandardNormal.sample(&mut draws)).collect();
-            let rounded = (0..4000).zip(noise).map(|(row, noise): (i32, f64)| (rate(row) + sigma * noise).round());
-            noise_variance(&rounded.collect::<Vec<f64>>())
+            let rounded =
+                (0..4000).zip(noise).map(|(row, noise): (i32, f64)| (rate(row) + sigma * noise).round() as i32);
+            noise_variance(&rounded.collect::<Vec<i32>>())
         };
         // A quarter of the variance, which the median of 4000 squares says to a twentieth, and of dependent
         // ones to a tenth. Rejects third differences, of which the ripple has 0.05 and more.
@@ -140,7 +141,6 @@ mod tests {
             let share = of(sigma) / (sigma * sigma);
             assert!((share - 0.25).abs() < 0.03, "{share}");
         }
-        let at_rest: Vec<f64> = (0..400).map(|_| draws.random_range(0..1).into()).collect();
-        assert_eq!(noise_variance(&at_rest), 0.0);
+        assert_eq!(noise_variance(&[0; 400]), 0.0);
     }
 }

@@ -95,7 +95,7 @@ impl ModelFit<'_> {
                 None => (None, SharedErrors::drawn(&mut draws)),
             };
             let mut rolled = self.rolled(segment, &smooth, &mut shared, &mut draws);
-            unround_rates(&mut rolled, number, &mut draws);
+            add_rounding_of_rates(&mut rolled, number, &mut draws);
             let after = self.measure_again(segment, &rolled, index, before, terms, &mut draws);
             count_again(segment, &smooth, &mut shared);
             carried = Some((after, shared));
@@ -222,7 +222,7 @@ fn smooth_turns(segment: &Segment<'_>, draws: &mut Draws) -> Vec<Wheels<f64>> {
 }
 
 /// The wheels turn by what the rounding of the recorded rates leaves out.
-fn unround_rates(rolled: &mut Segment<'_>, number: u64, draws: &mut Draws) {
+fn add_rounding_of_rates(rolled: &mut Segment<'_>, number: u64, draws: &mut Draws) {
     let rounding = rolled.rate_rounding;
     if !rounding.is_any() {
         return;

@@ -48,6 +48,18 @@ pub(crate) enum Shifts {
     Motion,
 }
 
+impl Shifts {
+    /// Takes from the records what was shifted.
+    fn undo(self, shifted: &mut Records<'_>, records: &Records<'_>) {
+        for (to, from) in shifted.segments.iter_mut().zip(&records.segments) {
+            match self {
+                Self::Poses => to.measurements.copy_from_slice(&from.measurements),
+                Self::Motion => to.intervals.copy_from_slice(&from.intervals),
+            }
+        }
+    }
+}
+
 impl SystematicErrors {
     /// `equations` gives the normal equation of each run with other records. `None` where there are no such
     /// errors.
@@ -60,13 +72,15 @@ impl SystematicErrors {
             return None;
         }
         let runs = equations(records, Shifts::Poses);
-        let gradients = errors.iter().map(|error| {
-            let mut shifted = records.clone();
-            let shifts = error.shift(&mut shifted, records);
-            let moved = equations(&shifted, shifts).into_iter().zip(&runs);
-            moved.map(|(moved, rest)| moved.gradient - &rest.gradient).collect()
-        });
-        Some(Self { gradients: gradients.collect(), runs })
+        let mut shifted = records.clone();
+        let mut shift_of = |error: &SystematicError| {
+            let shifts = error.shift(&mut shifted);
+            let moved = equations(&shifted, shifts);
+            shifts.undo(&mut shifted, records);
+            moved.into_iter().zip(&runs).map(|(moved, rest)| moved.gradient - &rest.gradient).collect()
+        };
+        let gradients = errors.iter().map(&mut shift_of).collect();
+        Some(Self { runs, gradients })
     }
 
     /// What they add to the covariance of parameters; `inverse` is that of the whole information.
@@ -127,20 +141,18 @@ fn errors(records: &Records<'_>) -> Vec<SystematicError> {
 }
 
 impl SystematicError {
-    /// Shifts records that are copies of others by it.
-    fn shift(&self, shifted: &mut Records<'_>, records: &Records<'_>) -> Shifts {
+    /// Shifts records by it.
+    fn shift(&self, records: &mut Records<'_>) -> Shifts {
         match self {
             Self::OfMap { coordinate, function, sigma } => {
-                for (to, from) in shifted.segments.iter_mut().zip(&records.segments) {
-                    // Displacements are in no map.
-                    if from.start == Start::MeasuredPose {
-                        shift_poses(to, *coordinate, |place| sigma * function.at(place));
-                    }
+                // Displacements are in no map.
+                for segment in records.segments.iter_mut().filter(|segment| segment.start == Start::MeasuredPose) {
+                    shift_poses(segment, *coordinate, |place| sigma * function.at(place));
                 }
                 Shifts::Poses
             }
             Self::OfRate(rate) => {
-                shifted.segments.iter_mut().for_each(|segment| shift_rate(segment, *rate));
+                records.segments.iter_mut().for_each(|segment| shift_rate(segment, *rate));
                 Shifts::Motion
             }
         }
