@@ -77,8 +77,11 @@ pub(crate) fn driven(true_m: [f64; 3], seed: u64) -> Log {
             for _ in 0..(length_s / step_s).round() as usize {
                 let t_s = step_s * f64::from(count);
                 if count % 4 == 0 {
+                    // Rates are even within a step: at an instant they are the mean of those before and after.
+                    let [v_now, omega_now] = [(v, speed), (omega, rate)]
+                        .map(|(of, goal): (f64, f64)| of + 0.5 * (goal - of) * step_s / lag_s);
                     // What the stated robot would do with the wheels' rates.
-                    let wheels = [-0.5, 0.5].map(|side| v + side * omega * true_m[2]);
+                    let wheels = [-0.5, 0.5].map(|side| v_now + side * omega_now * true_m[2]);
                     let [left, right] = [0, 1].map(|side: usize| wheels[side] / true_m[side] * 0.150);
                     log.rates.push([0.5 * (left + right), (right - left) / 0.300]);
                     log.odometry.push((run, t_s, turns.map(|turn: f64| (turn / TAU * 4096.0).round())));

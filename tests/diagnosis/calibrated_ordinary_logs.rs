@@ -43,10 +43,21 @@ fn calibrated(folder: &Path, truth_m: [f64; 3]) -> Calibrated {
     Calibrated { is_refused: false, said, z: z.collect() }
 }
 
+/// Errors over their standard deviations, or what is said instead.
+pub(crate) fn lengths(folder: &Path, truth_m: [f64; 3]) -> String {
+    let found = calibrated(folder, truth_m);
+    let z: Vec<String> = found.z.iter().map(|z| format!("{z:+.1}")).collect();
+    let said = found.said.replace('\n', " / ");
+    format!("{}{} {said}", if found.is_refused { "refused " } else { "" }, z.join(" "))
+}
+
 fn of_robot(change: Change, seed: u64) -> Calibrated {
     let mut robot = PlainRobot::ordinary(seed);
     change(&mut robot);
     let folder = tempfile::tempdir().expect("a temporary folder");
+    if let Some(kept) = std::env::var_os("YAIR_OUT") {
+        robot.write(&Path::new(&kept).join(seed.to_string()));
+    }
     let truth_m = robot.write(folder.path());
     calibrated(folder.path(), truth_m)
 }

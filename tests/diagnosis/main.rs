@@ -7,6 +7,7 @@ mod coarse_encoders;
 mod extended_model;
 mod hidden_effects;
 mod large_log;
+mod mixed_logs;
 #[path = "../support/motion_capture.rs"]
 mod motion_capture;
 mod nested_gain;

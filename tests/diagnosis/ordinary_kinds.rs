@@ -229,6 +229,13 @@ const KINDS: &[(&str, Change, &[&str])] = &[
         &[],
     ),
     (
+        "speeds of the instant at 20 Hz",
+        |of| {
+            (of.records, of.odometry_hz, of.has_rates_of_instants) = (Records::Speeds { step_m_s: 0.0 }, 20.0, true);
+        },
+        &["truth_latency"],
+    ),
+    (
         "rippled speeds in whole mm/s at 20 Hz",
         |of| {
             (of.records, of.odometry_hz, of.ripple) = (Records::Speeds { step_m_s: 1e-3 }, 20.0, 0.03);

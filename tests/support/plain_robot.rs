@@ -17,7 +17,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use draws::Draws;
+pub(crate) use draws::Draws;
 use drive::{Part, World, programs};
 
 /// What the outside instrument reports.
@@ -84,6 +84,8 @@ pub(crate) struct PlainRobot {
     pub(crate) odometry_hz: f64,
     pub(crate) stamps: Stamps,
     pub(crate) records: Records,
+    /// Recorded speeds are those of the row's instant.
+    pub(crate) has_rates_of_instants: bool,
     /// Time constant of the filter of recorded speeds.
     pub(crate) speed_filter_s: f64,
     /// What the counters hold when a run begins.
@@ -210,6 +212,7 @@ impl PlainRobot {
             odometry_hz: 100.0,
             stamps: Stamps::Exact,
             records: Records::Counts,
+            has_rates_of_instants: false,
             speed_filter_s: 0.0,
             first_count: 0.0,
             truth_hz: 10.0,

@@ -5,14 +5,15 @@
 //! same of a rate, forward or backward, share its error, which is uniform over a step. Noise of the speeds is
 //! a dither: of standard deviation σ in steps it leaves e^{−2π²σ²} of what rows share, and the rest is
 //! another error in each (Widrow & Kollár 2008). The noise is that of fifth differences, of which smooth
-//! motion has none.
+//! motion has none. The noise of speeds that are made of few counts dithers nothing: each number of counts
+//! has an error of its own.
 
 use std::f64::consts::TAU;
 
 use dataset::{NominalRobot, RunView, WheelLog};
 use kinematics::{Twist, Wheels};
 
-use crate::settings::CHI_SQUARE_1_MEDIAN;
+use crate::settings::{CHI_SQUARE_1_MEDIAN, MIN_COUNT_STEPS};
 
 /// What a row says of both rates, in whole steps; 0 at rest, and where nothing is rounded.
 pub(crate) type RateSteps = [i32; 2];
@@ -40,6 +41,7 @@ impl RecordedRates {
         let wheels = &run.odometry().wheels;
         let step = wheels.recorded_step()?;
         let geometry = robot.geometry().ok()?;
+        let is_twist = matches!(wheels, WheelLog::Twist { .. });
         let (columns, of_step_m_s) = match wheels {
             WheelLog::Speeds(speeds) => {
                 ([&speeds.left, &speeds.right], [Wheels { left: step, right: 0.0 }, Wheels { left: 0.0, right: step }])
@@ -51,14 +53,16 @@ impl RecordedRates {
             ),
             WheelLog::Ticks(_) | WheelLog::Angles(_) => return None,
         };
-        let steps = columns.map(|column| column.iter().map(|rate| (rate / step).round() as i32).collect());
-        Some(Self {
-            rounding: RateRounding {
-                shared: steps.each_ref().map(|steps: &Vec<i32>| (-0.5 * TAU * TAU * noise_variance(steps)).exp()),
-                step_rad_s: of_step_m_s.map(|of| of.zip_with(geometry.m_per_rad(), |m_s, m_per_rad| m_s / m_per_rad)),
-            },
-            steps,
-        })
+        let steps: [Vec<i32>; 2] =
+            columns.map(|column| column.iter().map(|rate| (rate / step).round() as i32).collect());
+        let step_rad_s = of_step_m_s.map(|of| of.zip_with(geometry.m_per_rad(), |m_s, m_per_rad| m_s / m_per_rad));
+        let count_rad_s = count_rad_s(run, robot);
+        let shared = [0, 1].map(|rate: usize| {
+            let of_count = step_rad_s[rate].map(|step| if step == 0.0 { 0.0 } else { count_rad_s / step.abs() });
+            let counted = if is_twist { of_count.map(|steps| 0.5 * steps) } else { of_count };
+            (-0.5 * TAU * TAU * dithering_variance(&steps[rate], counted)).exp()
+        });
+        Some(Self { rounding: RateRounding { shared, step_rad_s }, steps })
     }
 
     /// Of a row.
@@ -67,20 +71,37 @@ impl RecordedRates {
     }
 }
 
-/// Variance of the noise of values that are rounded to whole numbers, beside that of the rounding: by fifth
-/// differences in motion, by the median of their squares, as those of a robot that sets off are large. Speeds
-/// that are made of counts have the rounding of two counts: its differences are those of nearly twice its
-/// variance, and it is on a grid, which dithers less. A quarter counts.
-fn noise_variance(steps: &[i32]) -> f64 {
+/// What one count in a row's interval is of a wheel's rate, rad/s; 0 where a robot states no counts.
+fn count_rad_s(run: &RunView<'_>, robot: &NominalRobot) -> f64 {
+    let t_s = &run.odometry().t_s;
+    let intervals = t_s.len().saturating_sub(1);
+    match (robot.ticks_per_rev, t_s.first(), t_s.last()) {
+        (Some(ticks), Some(first_s), Some(last_s)) if intervals > 0 => {
+            TAU / ticks / ((last_s - first_s) / intervals as f64)
+        }
+        _ => 0.0,
+    }
+}
+
+/// Weights of fifth differences, the sum of their squares, and of those of one sign.
+const FIFTH: ([f64; 6], f64, f64) = ([-1.0, 5.0, -10.0, 10.0, -5.0, 1.0], 252.0, 16.0);
+
+/// Variance of what dithers values that are rounded to whole numbers: of their noise beside that of the
+/// rounding, by fifth differences in motion, by the median of their squares, as those of a robot that sets off
+/// are large. `counted` is what one count of each wheel makes of a value. Where that is so much that an
+/// interval of rounding has hardly two numbers of counts, their noise is no dither: one count more in every
+/// other row is all that it can be. Of finer speeds that are made of counts, the rounding of two counts has
+/// nearly twice its variance in fifth differences, and is on a grid, which dithers less: a quarter counts.
+fn dithering_variance(steps: &[i32], counted: Wheels<f64>) -> f64 {
+    let (weights, squares_of_weights, of_one_sign) = FIFTH;
     let in_motion = steps.windows(6).filter(|of| of.iter().any(|step| *step != 0));
-    let fifth = |of: &[i32]| {
-        let weights = [-1.0, 5.0, -10.0, 10.0, -5.0, 1.0];
-        of.iter().zip(weights).map(|(step, weight)| weight * f64::from(*step)).sum::<f64>()
-    };
+    let fifth = |of: &[i32]| of.iter().zip(weights).map(|(step, weight)| weight * f64::from(*step)).sum::<f64>();
     let mut squares: Vec<f64> = in_motion.map(|of| fifth(of).powi(2)).collect();
     squares.sort_unstable_by(f64::total_cmp);
     let middle = squares.get(squares.len() / 2).copied().unwrap_or(0.0);
-    0.25 * f64::max(middle / CHI_SQUARE_1_MEDIAN / 252.0 - 1.0 / 12.0, 0.0)
+    let is_coarse = f64::max(counted.left, counted.right) >= MIN_COUNT_STEPS;
+    let of_counts = if is_coarse { (of_one_sign * (counted.left + counted.right)).powi(2) } else { 0.0 };
+    0.25 * f64::max((middle - of_counts) / CHI_SQUARE_1_MEDIAN / squares_of_weights - 1.0 / 12.0, 0.0)
 }
 
 /// What rows say of one of both rates, without its sign: drives and their reverses have the same wheels, and
@@ -132,7 +153,7 @@ mod tests {
             let noise: Vec<f64> = (0..4000).map(|_| StandardNormal.sample(&mut draws)).collect();
             let rounded =
                 (0..4000).zip(noise).map(|(row, noise): (i32, f64)| (rate(row) + sigma * noise).round() as i32);
-            noise_variance(&rounded.collect::<Vec<i32>>())
+            dithering_variance(&rounded.collect::<Vec<i32>>(), Wheels::both(0.0))
         };
         // A quarter of the variance, which the median of 4000 squares says to a twentieth, and of dependent
         // ones to a tenth. Rejects third differences, of which the ripple has 0.05 and more.
@@ -141,6 +162,18 @@ mod tests {
             let share = of(sigma) / (sigma * sigma);
             assert!((share - 0.25).abs() < 0.03, "{share}");
         }
-        assert_eq!(noise_variance(&[0; 400]), 0.0);
+        assert_eq!(dithering_variance(&[0; 400], Wheels::both(0.0)), 0.0);
+    }
+
+    #[test]
+    fn the_noise_of_few_counts_dithers_nothing() {
+        // Speeds of 39.6 counts a row, 2.28 steps each.
+        let counts: Vec<f64> = (0..4000).map(|row| (39.6 * f64::from(row)).floor()).collect();
+        let speeds = counts.windows(2).map(|of| (2.28 * (of[1] - of[0])).round() as i32);
+        let steps: Vec<i32> = speeds.collect();
+        let one_wheel = Wheels { left: 2.28, right: 0.0 };
+        assert_eq!(dithering_variance(&steps, one_wheel), 0.0);
+        // Rejects noise of counts as that of speeds, which leaves e^−5 of the error.
+        assert!(dithering_variance(&steps, Wheels::both(0.0)) > 0.25);
     }
 }

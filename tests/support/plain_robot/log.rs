@@ -104,7 +104,13 @@ impl PlainRobot {
             let since = last_row.replace(row).unwrap_or((row.0 - 1e-3 * every as f64, counts));
             let share =
                 if self.speed_filter_s > 0.0 { 1.0 - (-1e-3 * every as f64 / self.speed_filter_s).exp() } else { 1.0 };
-            let now_m_s = self.speeds_m_s(row, since);
+            let now_m_s = if self.has_rates_of_instants {
+                let beside = [step.saturating_sub(1), (step + 1).min(path.samples.len() - 1)];
+                let [last, next] = beside.map(|at| path.samples[at].wheels_rad);
+                [0, 1].map(|wheel| 0.5e3 * 0.08 * self.scale * (next[wheel] - last[wheel]))
+            } else {
+                self.speeds_m_s(row, since)
+            };
             filtered_m_s = [0, 1].map(|wheel| filtered_m_s[wheel] + share * (now_m_s[wheel] - filtered_m_s[wheel]));
             let values = self.recorded(counts, filtered_m_s);
             if is_lost || is_unchanged {

@@ -23,7 +23,7 @@ pub(crate) use partial::{
     WALL_START_DIRECTIONS, WALL_START_STEPS,
 };
 pub(crate) use poses_between_rows::{MAX_INTERPOLATED_VARIANCE_RATIO, MAX_SHARED_VARIANCE_RATIO, MIN_POSES_NEAR_ROWS};
-pub(crate) use recorded_rates::MAX_SHARED_RATES;
+pub(crate) use recorded_rates::{MAX_SHARED_RATES, MIN_COUNT_STEPS};
 pub(crate) use start_headings::{HEADING_STEP_TOLERANCE_RAD, START_HEADING_BASELINE_M, START_HEADING_PRECISION};
 pub(crate) use thinning::{MIN_MEASUREMENTS_PER_RUN, SPACING_SLACK, THINNING_FACTOR, THINNING_PHASES};
 
