@@ -243,16 +243,20 @@ fn mixed_logs_are_diagnosed() {
         .map(|seed| {
             let drawn = Mixed::drawn(seed);
             let (found, truth_m, folder) = diagnosed(&drawn.robot);
-            let names: Vec<&str> = found.iter().flat_map(|d| &d.findings).map(|f| f.names[0].as_str()).collect();
-            let wrong: Vec<&&str> =
-                names.iter().filter(|name| !drawn.exempt.contains(name) && drawn.fault != Some(**name)).collect();
+            let is_exempt = |name: &str| drawn.exempt.contains(&name) || drawn.fault == Some(name);
+            let findings: Vec<&Finding> = found.iter().flat_map(|document| &document.findings).collect();
+            let is_named = |fault: &str| findings.iter().any(|finding| finding.names.iter().any(|name| name == fault));
+            let wrong: Vec<&&Finding> = findings.iter().filter(|finding| !is_exempt(&finding.names[0])).collect();
+            let is_hedged = wrong.iter().all(|finding| finding.names.iter().any(|name| name == "unlisted"));
             let verdict = match (&found, drawn.fault) {
                 (Err(_), _) => "refused",
                 (_, None) if wrong.is_empty() => "null right",
                 (_, None) => "null WRONG",
-                (_, Some(_)) if !wrong.is_empty() => "fault WRONG",
-                (_, Some(fault)) if names.contains(&fault) => "fault right",
-                (_, Some(_)) => "fault unseen",
+                (_, Some(_)) if !is_hedged => "fault WRONG",
+                (_, Some(fault)) if is_named(fault) && wrong.is_empty() => "fault right",
+                (_, Some(fault)) if is_named(fault) => "fault more",
+                (_, Some(_)) if wrong.is_empty() => "fault unseen",
+                (_, Some(_)) => "fault hedged",
             };
             let lengths = crate::calibrated_ordinary_logs::lengths(folder.path(), truth_m);
             format!("{verdict} {seed}: {} => {} | {lengths}", drawn.said.join(", "), shown(&found))

@@ -109,7 +109,8 @@ fn possible_rivals<'a>(
 /// The model without the effects that only cancel each other: two that were found in the place of a third
 /// stay significant beside it, each given the other, and two that no third stands for fit the driving that
 /// was recorded by the difference of two large errors, and fail on any other. Of all subsets of the effects
-/// that do not cancel each other, the smallest that the log Bayes factor does not discriminate from the best.
+/// that do not cancel each other, the smallest that the log Bayes factor does not discriminate from the best, by
+/// more than what may be the error of its own effects' form.
 fn without_what_cancels<'a>(
     (base, known): (&ModelFit<'a>, &mut FitCache<'a>),
     model: AugmentedModel<'a>,
@@ -135,11 +136,11 @@ fn without_what_cancels<'a>(
         subsets.push(model);
     }
     let odds: Vec<f64> = subsets.iter().map(|subset| log_bayes_factor(base, subset)).collect();
-    let best = odds.iter().copied().enumerate().max_by(|(_, a), (_, b)| a.total_cmp(b));
-    let (best, margin) = best.map_or((0.0, 0.0), |(best, odds)| (odds, log_odds_margin_of(&subsets[best])));
-    let is_close = |odds: f64| odds >= best - margin;
+    let best = odds.iter().copied().fold(f64::MIN, f64::max);
+    // What more effects explain may be the error of form of those in the subset, and of no others.
+    let is_close = |subset: usize| odds[subset] >= best - log_odds_margin_of(&subsets[subset]);
     let fewest = (0..subsets.len())
-        .filter(|&subset| is_close(odds[subset]))
+        .filter(|&subset| is_close(subset))
         .min_by(|&a, &b| {
             let sizes = subsets[a].candidates.len().cmp(&subsets[b].candidates.len());
             sizes.then(odds[b].total_cmp(&odds[a]))

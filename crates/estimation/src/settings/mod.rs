@@ -122,7 +122,7 @@ pub(crate) const RATE_WINDOWS: [usize; 12] = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 
 
 /// Variance of a rate's noise, over that of the rate itself, at which a window is wide enough.
 /// Budgeted: a term's size is then estimated a tenth too small at the most (errors in variables).
-pub(crate) const RATE_NOISE_FRACTION: f64 = 0.1;
+pub(crate) const RATE_NOISE_FRACTION: f64 = 0.001;
 
 /// Variance of the noise of a single row's rate, over the rates' mean square, up to which a row's speed is
 /// taken from its own counts.
