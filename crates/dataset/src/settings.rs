@@ -51,3 +51,19 @@ pub(crate) const DECIMAL_TOLERANCE: f64 = 1e-3;
 /// Distinct values of the rates of a run from which on their decimals are those of rounding.
 /// Budgeted: robots are told to drive at some round speeds, and speed up through many.
 pub(crate) const MIN_DISTINCT_RATES: usize = 8;
+
+/// Counts that the rounding of a rate is at the most, for the nearest to be the right one.
+/// Derived: half of it is halfway to the next.
+pub(crate) const MAX_ROUNDED_COUNTS: f64 = 0.25;
+
+/// Counts by which a rate is off a whole number beside its rounding.
+/// Budgeted: periods are known to some 1e-4, of a hundred counts.
+pub(crate) const COUNT_TOLERANCE: f64 = 0.02;
+
+/// Share of the rows in which a wheel turns that are made of counts at the least.
+/// Budgeted: rows at the ends of gaps have times of their own.
+pub(crate) const MIN_COUNTED_SHARE: f64 = 0.98;
+
+/// Probability at the most that rates which are not made of counts are within their rounding of such.
+/// Budgeted: one log in 1e12.
+pub(crate) const MAX_CHANCE_OF_COUNTS: f64 = 1e-12;

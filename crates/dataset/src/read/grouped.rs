@@ -2,11 +2,13 @@
 
 use std::ops::Range;
 use std::path::PathBuf;
+use std::slice;
 
 use super::columns::PointIndex;
 use super::truth::TruthTable;
 use super::{GYRO, Opened, has_truth, odometry, without_truth};
 use crate::corrections::Corrections;
+use crate::counted_rates;
 use crate::error::DatasetError;
 use crate::record::{Dataset, NominalRobot, Run, RunInfo};
 use crate::table::{MARKED_ROWS, Survey};
@@ -84,6 +86,7 @@ impl Grouped {
         if has_truth(&run) {
             let mut run = unwrapped(run, robot);
             self.corrections.apply(&mut run);
+            counted_rates::restore(slice::from_mut(&mut run), robot);
             return Ok(run);
         }
         let tables: Vec<_> = self.truths.iter().map(|(truth, _)| truth.name()).collect();
@@ -113,7 +116,9 @@ impl Grouped {
         for (truth, rows) in &mut self.truths {
             truth.read_between(number, rows, (from_s, to_s), &self.points, &mut run)?;
         }
-        Ok(unwrapped(run, robot))
+        let mut run = unwrapped(run, robot);
+        counted_rates::restore(slice::from_mut(&mut run), robot);
+        Ok(run)
     }
 }
 

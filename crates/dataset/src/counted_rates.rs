@@ -1,0 +1,255 @@
+//! Recorded rates that are made of counts.
+//!
+//! A driver that divides counts by the time between rows, and writes the quotient with few decimals, has not
+//! lost the counts: where they are farther apart than what was rounded, the nearest is the right one. The
+//! rounding of a rate stays for as long as the robot drives evenly; that of counts does not
+//! ([`crate::recorded_step`]).
+
+use std::collections::BTreeSet;
+use std::f64::consts::TAU;
+
+use kinematics::{DriveGeometry, Side, Twist, Wheels};
+
+use crate::median::median;
+use crate::record::{NominalRobot, Run, WheelLog};
+use crate::settings::{COUNT_TOLERANCE, MAX_CHANCE_OF_COUNTS, MAX_ROUNDED_COUNTS, MIN_COUNTED_SHARE};
+
+/// Puts counts in place of recorded rates, where these are a whole number of the stated counts in a sampling
+/// period, or in the time since the row before, but for their rounding. Where a few rows are not, or rows are
+/// missing, of which nobody knows the counts, the rates of the others are put right. What a robot's runs say
+/// together decides.
+pub(crate) fn restore(runs: &mut [Run], robot: &NominalRobot) {
+    for has_even_rows in [true, false] {
+        let found: Vec<Option<CountedRates>> =
+            runs.iter().map(|run| CountedRates::of(run, robot, has_even_rows)).collect();
+        if are_counted(&found.iter().flatten().collect::<Vec<_>>()) {
+            let found = runs.iter_mut().zip(&found).filter_map(|(run, found)| Some((run, found.as_ref()?)));
+            found.for_each(|(run, found)| found.apply(run));
+            return;
+        }
+    }
+}
+
+/// The counts that the rates of a run may be made of.
+struct CountedRates {
+    /// By row; `None` where a rate is none of whole numbers.
+    counts: Vec<Option<Wheels<f64>>>,
+    /// In which they came, seconds.
+    row_s: Vec<f64>,
+    /// Counts that rates are rounded by at the most.
+    rounded: f64,
+    /// Are rows missing?
+    is_missing: bool,
+    m_per_count: Wheels<f64>,
+    separation_m: f64,
+}
+
+impl CountedRates {
+    fn of(run: &Run, robot: &NominalRobot, has_even_rows: bool) -> Option<Self> {
+        let ticks_per_rev = robot.ticks_per_rev?;
+        let geometry = robot.geometry().ok()?;
+        let step = run.odometry.wheels.recorded_step().unwrap_or(0.0);
+        let (speeds_m_s, rounded_m_s) = wheel_speeds_m_s(&run.odometry.wheels, &geometry, step)?;
+        let m_per_count = geometry.m_per_rad().map(|m_per_rad| m_per_rad * TAU / ticks_per_rev);
+        let t_s = &run.odometry.t_s;
+        let since_s: Vec<f64> = t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let usual_s = median(since_s.clone())?;
+        let period = t_s.sampling_period();
+        let row_s = if has_even_rows {
+            vec![period.map_or(usual_s, |period| period.period_s); t_s.len()]
+        } else {
+            [usual_s].into_iter().chain(since_s).collect()
+        };
+        let of_row = |(speed_m_s, row_s): (&Wheels<f64>, &f64)| {
+            let nearest = speed_m_s.zip_with(m_per_count, |speed_m_s, m_per_count| {
+                nearest_count(speed_m_s * row_s / m_per_count, rounded_m_s * row_s / m_per_count)
+            });
+            Some(Wheels { left: nearest.left?, right: nearest.right? })
+        };
+        Some(Self {
+            counts: speeds_m_s.iter().zip(&row_s).map(of_row).collect(),
+            rounded: rounded_m_s * usual_s / m_per_count.left.min(m_per_count.right),
+            row_s,
+            is_missing: period.is_some_and(|period| period.numbers.windows(2).any(|pair| pair[1] - pair[0] != 1)),
+            m_per_count,
+            separation_m: geometry.wheel_separation_m(),
+        })
+    }
+
+    /// Rows in which a wheel turns, or may.
+    fn moving(&self) -> impl Iterator<Item = &Option<Wheels<f64>>> {
+        self.counts.iter().filter(|of| **of != Some(Wheels::both(0.0)))
+    }
+
+    fn apply(&self, run: &mut Run) {
+        if !self.is_missing && self.counts.iter().skip(1).all(Option::is_some) {
+            run.odometry.wheels = WheelLog::Ticks(Wheels::from_sides(|side| self.counter(side)));
+            return;
+        }
+        for (row, (of, row_s)) in self.counts.iter().zip(&self.row_s).enumerate() {
+            let Some(counts) = of else { continue };
+            let speed_m_s = counts.zip_with(self.m_per_count, |count, m_per_count| count * m_per_count / row_s);
+            match &mut run.odometry.wheels {
+                WheelLog::Speeds(speeds) => (speeds.left[row], speeds.right[row]) = (speed_m_s.left, speed_m_s.right),
+                WheelLog::Twist { v_mps, omega_radps } => {
+                    v_mps[row] = 0.5 * (speed_m_s.left + speed_m_s.right);
+                    omega_radps[row] = (speed_m_s.right - speed_m_s.left) / self.separation_m;
+                }
+                WheelLog::Ticks(_) | WheelLog::Angles(_) => {}
+            }
+        }
+    }
+
+    /// A wheel's counter since the first row, whose own counts are of an interval before the log.
+    fn counter(&self, side: Side) -> Vec<i64> {
+        let mut count = 0;
+        let next = |of: &Option<Wheels<f64>>| {
+            count += of.map_or(0, |of| of[side] as i64);
+            count
+        };
+        let since_first: Vec<i64> = self.counts.iter().skip(1).map(next).collect();
+        [0].into_iter().chain(since_first).collect()
+    }
+}
+
+/// Speeds of the wheels at the floor by row, and what the rounding to a step makes them wrong by at the most,
+/// m/s; `None` of counts and angles.
+fn wheel_speeds_m_s(wheels: &WheelLog, geometry: &DriveGeometry, step: f64) -> Option<(Vec<Wheels<f64>>, f64)> {
+    match wheels {
+        WheelLog::Speeds(speeds) => {
+            let rows = speeds.left.iter().zip(&speeds.right);
+            Some((rows.map(|(&left, &right)| Wheels { left, right }).collect(), 0.5 * step))
+        }
+        WheelLog::Twist { v_mps, omega_radps } => {
+            let rows = v_mps.iter().zip(omega_radps);
+            let speeds = rows.map(|(&v_m_s, &omega_rad_s)| geometry.wheel_speed_m_s(Twist { v_m_s, omega_rad_s }));
+            Some((speeds.collect(), 0.5 * step * (1.0 + 0.5 * geometry.wheel_separation_m())))
+        }
+        WheelLog::Ticks(_) | WheelLog::Angles(_) => None,
+    }
+}
+
+/// The nearest whole number of counts; `None` where the rounding leaves open which it is, or none is within it.
+fn nearest_count(counts: f64, rounded: f64) -> Option<f64> {
+    let nearest = counts.round();
+    (rounded <= MAX_ROUNDED_COUNTS && (counts - nearest).abs() <= rounded + COUNT_TOLERANCE).then_some(nearest)
+}
+
+/// Are nearly all rows in which a wheel turns made of counts, and of so many numbers that it is no chance? A
+/// rate of no counts is within the rounding of one with twice that probability, and a robot that drives evenly
+/// says the same again and again.
+fn are_counted(runs: &[&CountedRates]) -> bool {
+    let moving = || runs.iter().flat_map(|run| run.moving());
+    let counted: Vec<&Wheels<f64>> = moving().flatten().collect();
+    let numbers: BTreeSet<(Side, i64)> =
+        counted.iter().flat_map(|of| Side::BOTH.map(|side| (side, of[side] as i64))).collect();
+    let rounded = runs.iter().map(|run| run.rounded).fold(0.0, f64::max);
+    let log_chance = numbers.len() as f64 * (2.0 * (rounded + COUNT_TOLERANCE)).ln();
+    log_chance <= MAX_CHANCE_OF_COUNTS.ln() && counted.len() as f64 >= MIN_COUNTED_SHARE * moving().count() as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::Odometry;
+
+    const ROBOT: NominalRobot = NominalRobot {
+        left_wheel_diameter_m: 0.16,
+        right_wheel_diameter_m: 0.16,
+        wheel_separation_m: 0.363,
+        ticks_per_rev: Some(500.0),
+        counter_bits: None,
+    };
+
+    /// A robot that speeds up for 2 s and goes on, its counts divided by these times; rates in steps.
+    fn run(row_s: impl Fn(usize) -> f64, step: f64, is_twist: bool) -> (Run, Wheels<Vec<f64>>) {
+        let m_per_count = 0.16 * std::f64::consts::PI / 500.0;
+        let counts = |share: f64| -> Vec<f64> {
+            let at = |row: u32| {
+                let t_s = 0.02 * f64::from(row);
+                (share * 0.3 * if t_s < 2.0 { 0.25 * t_s * t_s } else { t_s - 1.0 } / m_per_count).floor()
+            };
+            (0..400).map(|row| at(row + 1) - at(row)).collect()
+        };
+        let speeds = |share: f64| -> Vec<f64> {
+            counts(share).iter().enumerate().map(|(row, count)| count * m_per_count / row_s(row)).collect()
+        };
+        let exact = Wheels { left: speeds(1.0), right: speeds(-0.61) };
+        let rounded = |of: f64| (of / step).round() * step;
+        let wheels = if is_twist {
+            let both = || exact.left.iter().zip(&exact.right);
+            WheelLog::Twist {
+                v_mps: both().map(|(left, right)| rounded(0.5 * (left + right))).collect(),
+                omega_radps: both().map(|(left, right)| rounded((right - left) / 0.363)).collect(),
+            }
+        } else {
+            WheelLog::Speeds(exact.as_ref().map(|of| of.iter().map(|of| rounded(*of)).collect()))
+        };
+        let t_s: Vec<f64> = (0..400)
+            .scan(0.0, |t_s, row| {
+                *t_s += row_s(row);
+                Some(*t_s)
+            })
+            .collect();
+        (Run { odometry: Odometry { t_s: t_s.into(), wheels, ..Odometry::default() }, ..Run::default() }, exact)
+    }
+
+    fn largest_error(run: &Run, exact: &Wheels<Vec<f64>>) -> f64 {
+        let geometry = ROBOT.geometry().expect("a robot");
+        let (speeds, _) = wheel_speeds_m_s(&run.odometry.wheels, &geometry, 1e-3).expect("speeds");
+        let off = |(row, of): (usize, &Wheels<f64>)| {
+            f64::max((of.left - exact.left[row]).abs(), (of.right - exact.right[row]).abs())
+        };
+        speeds.iter().enumerate().map(off).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn rates_of_counts_are_the_counts() {
+        // One count is 50 mm/s; the rates of rows of even length, and of rows that were late.
+        let late = |row: usize| if row % 7 == 3 { 0.023 } else { 0.0195 };
+        for is_twist in [false, true] {
+            for row_s in [&|_| 0.02, &late as &dyn Fn(usize) -> f64] {
+                let (mut run, exact) = run(row_s, 1e-3, is_twist);
+                restore(std::slice::from_mut(&mut run), &ROBOT);
+                let WheelLog::Ticks(ticks) = &run.odometry.wheels else { panic!("{is_twist}") };
+                let m_per_count = 0.16 * std::f64::consts::PI / 500.0;
+                for row in 1..400 {
+                    let count = |column: &[i64]| (column[row] - column[row - 1]) as f64 * m_per_count / row_s(row);
+                    assert!((count(&ticks.left) - exact.left[row]).abs() < 1e-9);
+                    assert!((count(&ticks.right) - exact.right[row]).abs() < 1e-9);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn rates_beside_missing_rows_are_those_of_their_counts() {
+        for is_twist in [false, true] {
+            let (mut run, mut exact) = run(|_| 0.02, 1e-3, is_twist);
+            let keep: Vec<bool> = (0..400).map(|row| row % 50 != 7).collect();
+            run.odometry.retain_rows(&keep);
+            for column in [&mut exact.left, &mut exact.right] {
+                let mut kept = keep.iter();
+                column.retain(|_| kept.next() == Some(&true));
+            }
+            assert!(largest_error(&run, &exact) > 3e-4);
+            restore(std::slice::from_mut(&mut run), &ROBOT);
+            assert!(largest_error(&run, &exact) < 1e-9, "{is_twist}");
+            assert_eq!(run.odometry.wheels.recorded_step(), None);
+        }
+    }
+
+    #[test]
+    fn rates_of_finer_counts_and_of_no_counts_stay() {
+        // Steps of 0.05 m/s are as large as a count.
+        let (before, _) = run(|_| 0.02, 0.05, false);
+        let mut after = before.clone();
+        restore(std::slice::from_mut(&mut after), &ROBOT);
+        assert_eq!(after.odometry.wheels, before.odometry.wheels);
+        // A robot of 437 counts says these rates no more often than chance does.
+        let (before, _) = run(|_| 0.02, 1e-3, false);
+        let mut after = before.clone();
+        restore(std::slice::from_mut(&mut after), &NominalRobot { ticks_per_rev: Some(437.0), ..ROBOT });
+        assert_eq!(after.odometry.wheels, before.odometry.wheels);
+    }
+}
