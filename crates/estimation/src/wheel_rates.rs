@@ -4,7 +4,7 @@
 //! same row has it too, and the product of both is not zero on average: terms in speed and acceleration, and
 //! latencies, are then biased by several standard deviations (errors in variables; Fuller 1987). A rate from
 //! as many rows before as after, weighted alike, does not have it. Rates are slopes of local regressions over
-//! 2m + 1 rows, m as small as it may be: the smallest at which their noise is below a tenth of the signal's
+//! 2m + 1 rows, m as small as it may be: the smallest at which their noise is below a thousandth of the signal's
 //! variance, unless a wider one blurs more than it averages out (Savitzky & Golay 1964; Lepski 1990).
 
 use kinematics::Wheels;
@@ -160,7 +160,7 @@ pub(crate) fn quantum_of_angles(angle_rad: &[f64]) -> f64 {
     if on_grid >= MIN_GRID_FRACTION * all { quantum } else { 0.0 }
 }
 
-/// Is the noise of the rates of the centre and of the turn below a tenth of their own variance?
+/// Is the noise of the rates of the centre and of the turn below what is wanted of their own variance?
 fn is_below_signal(rates: &[Vec<f64>; 2], noise: [f64; 2], separation_m: f64, m_per_rad: [f64; 2]) -> bool {
     let of = |weights: [f64; 2]| {
         let noise: f64 = (0..2).map(|side| (weights[side] * m_per_rad[side]).powi(2) * noise[side]).sum();
