@@ -166,6 +166,7 @@ impl<'a> Thinned<'a> {
     fn search(self, catalogue: &[Candidate]) -> MeanSearch<'a> {
         let Autocorrelation { correlation, spurious, .. } = self.autocorrelation;
         let (base, model) = search_beside_timing_noise(self.base, catalogue);
+        let (model, _) = search_ungated_if_outliers(&base, model, catalogue);
         let model = compare_with_sparse(&base, model);
         MeanSearch { base, model, correlated: Some(correlation), spurious }
     }
@@ -191,10 +192,7 @@ struct Autocorrelation {
 /// The search before measurements are thinned.
 fn search_among_all<'a>(base: ModelFit<'a>, catalogue: &[Candidate]) -> AmongAll<'a> {
     let (base, model) = search_beside_timing_noise(base, catalogue);
-    // A large effect in few measurements looks like outliers: what a search among all measurements finds.
-    let open = if model.has_outliers() { base.refit_ungated().ok() } else { None };
-    let ungated = open.as_ref().and_then(|open| search_ungated((&base, open), &model.found, catalogue));
-    let model = ungated.map_or(model, MeanModel::of_effects);
+    let (model, open) = search_ungated_if_outliers(&base, model, catalogue);
     // If no effect explains them, but residuals depend on something: sparse terms among all measurements.
     let unexplained = model.has_outliers() && model.found.model.candidates.is_empty() && model.shows_dependence();
     let terms = open.filter(|_| unexplained).and_then(|open| UncataloguedTerms::ungated_terms((&base, &open)));
@@ -230,6 +228,18 @@ fn autocorrelation_by_part(
         check(&AugmentedModel { fit, candidates })
     };
     (!is_white(&checked)).then_some(Autocorrelation { correlation: checked.correlation, ..of_part })
+}
+
+/// A large effect in few measurements looks like outliers: what a search without a gate finds, where there are
+/// some, and the fit to all measurements.
+fn search_ungated_if_outliers<'a>(
+    base: &ModelFit<'a>,
+    model: MeanModel<'a>,
+    catalogue: &[Candidate],
+) -> (MeanModel<'a>, Option<ModelFit<'a>>) {
+    let open = if model.has_outliers() { base.refit_ungated().ok() } else { None };
+    let ungated = open.as_ref().and_then(|open| search_ungated((base, open), &model.found, catalogue));
+    (ungated.map_or(model, MeanModel::of_effects), open)
 }
 
 /// The effects beside a base fit. Where instants are noisy beside them, the base fit with that noise, and the

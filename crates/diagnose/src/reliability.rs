@@ -5,28 +5,35 @@
 //! whose information rounding makes more than a share is not resolved by these encoders, and is not tested.
 
 use estimation::ModelFit;
+use model_term::TermParameter;
 use nalgebra::DMatrix;
 
 use crate::candidate::Candidate;
 use crate::scan::{Scored, prior_scaled, scan_parts_of};
 use crate::settings::search::{MIN_DETECTABLE_SIGMAS, MIN_RELIABILITY};
 
-/// Which of candidates that were tested beside a fit's own the encoders do not resolve.
+/// Which of candidates that were tested beside a fit's own the encoders do not resolve. Of all measurements:
+/// the motion by which an effect shows is in those that it makes outliers.
 pub(crate) fn unresolved(fit: &ModelFit<'_>, chosen: &[Candidate], scored: &[Scored]) -> Vec<Candidate> {
-    let Some(noisier) = fit.with_noisier_rates() else { return Vec::new() };
+    let open = if fit.solution.pass.outliers.is_empty() { None } else { Some(fit.evaluated_ungated()) };
+    let Some(noisier) = open.as_ref().unwrap_or(fit).with_noisier_rates() else { return Vec::new() };
     let detectable: Vec<&Scored> = scored.iter().filter(|scored| scored.dimensions > 0).collect();
     let parts: Vec<&[Candidate]> = detectable.iter().map(|scored| std::slice::from_ref(&scored.candidate)).collect();
-    let with_noise = scan_parts_of(&noisier, chosen, &parts, |_, projected, _| projected.information.clone());
-    let is_unresolved = |(scored, noisier): &(&Scored, DMatrix<f64>)| reliability(scored, noisier) < MIN_RELIABILITY;
-    let of = detectable.into_iter().zip(with_noise).filter(is_unresolved);
+    let informations = |fit| scan_parts_of(fit, chosen, &parts, |_, projected, _| projected.information.clone());
+    let own = open.as_ref().map_or_else(|| detectable.iter().map(|of| of.information.clone()).collect(), informations);
+    let with_noise = informations(&noisier);
+    let is_unresolved = |(scored, (own, noisier)): &(&Scored, (DMatrix<f64>, DMatrix<f64>))| {
+        reliability(&scored.parameters, own, noisier) < MIN_RELIABILITY
+    };
+    let of = detectable.into_iter().zip(own.into_iter().zip(with_noise)).filter(is_unresolved);
     of.map(|(scored, _)| scored.candidate.clone()).collect()
 }
 
-/// Share of the motion in a candidate's information, by its information under noise added once more: of all
-/// directions in which it is detectable together. Negative where the noise is more than the motion.
-fn reliability(scored: &Scored, noisier: &DMatrix<f64>) -> f64 {
-    let eigen = prior_scaled(&scored.information, &scored.parameters).symmetric_eigen();
-    let noisier = prior_scaled(noisier, &scored.parameters);
+/// Share of the motion in a candidate's information, by that under noise added once more: of all directions in
+/// which it is detectable together. Negative where the noise is more than the motion.
+fn reliability(parameters: &[TermParameter], own: &DMatrix<f64>, noisier: &DMatrix<f64>) -> f64 {
+    let eigen = prior_scaled(own, parameters).symmetric_eigen();
+    let noisier = prior_scaled(noisier, parameters);
     let directions = eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter());
     let (own, with_noise) = directions
         .filter(|(value, _)| **value >= MIN_DETECTABLE_SIGMAS * MIN_DETECTABLE_SIGMAS)
@@ -38,21 +45,14 @@ fn reliability(scored: &Scored, noisier: &DMatrix<f64>) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use model_term::TermParameter;
-
     use super::*;
-    use crate::ranking::tests::scored;
 
     #[test]
     fn reliability_is_the_share_of_the_motion() {
         let parameter = |prior_sigma: f64| TermParameter { name: "a", unit: "1", prior_sigma };
         let of = |prior_sigma: [f64; 2], own: [f64; 4], noisier: [f64; 4]| {
-            let scored = Scored {
-                parameters: prior_sigma.map(parameter).to_vec(),
-                information: DMatrix::from_row_slice(2, 2, &own),
-                ..scored("slip_speed", 1.0, 0.0, 2)
-            };
-            reliability(&scored, &DMatrix::from_row_slice(2, 2, &noisier))
+            let of = |values: &[f64]| DMatrix::from_row_slice(2, 2, values);
+            reliability(&prior_sigma.map(parameter), &of(&own), &of(&noisier))
         };
         let none = |value: f64| [value, 0.0, 0.0, value];
         // Motion of 30 and noise of 10, which once more makes 50: ¾.

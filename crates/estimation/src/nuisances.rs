@@ -144,8 +144,8 @@ fn hidden_directions(fit: &ModelFit<'_>) -> usize {
 }
 
 /// Autocorrelated innovations and outliers may be due to wrong extrinsics or latency. Fits these without
-/// thinning and without the gate. The fit is accepted if its innovations need no thinning, and if the fit
-/// without nuisances needs thinning or has more than twice as many outliers.
+/// thinning and without the gate. The fit is accepted if the one without nuisances has more than twice as many
+/// outliers, each thinned as it needs it, or if that alone needs thinning.
 pub(crate) fn explained_by_nuisances<'a>(
     fit: &ModelFit<'a>,
     thin: bool,
@@ -164,7 +164,12 @@ pub(crate) fn explained_by_nuisances<'a>(
     }
     let outliers = |found: &ModelFit<'_>| found.solution.pass.outliers.len();
     let uses_more = plain.thinning != Thinning::NONE || MIN_OUTLIER_REDUCTION * outliers(&explained) < outliers(&plain);
-    let is_better = uses_more && !(thin && explained.is_to_be_thinned());
+    let is_better = if thin && explained.is_to_be_thinned() {
+        explained.thin()?;
+        MIN_OUTLIER_REDUCTION * outliers(&explained) < outliers(&plain)
+    } else {
+        uses_more
+    };
     Ok(if is_better { Explained::Yes(explained) } else { Explained::No { thinned: plain } })
 }
 
