@@ -231,13 +231,15 @@ fn autocorrelation_by_part(
 }
 
 /// A large effect in few measurements looks like outliers: what a search without a gate finds, where there are
-/// some, and the fit to all measurements.
+/// more of them than noise makes, or than beside the effects that were found, and the fit to all measurements.
 fn search_ungated_if_outliers<'a>(
     base: &ModelFit<'a>,
     model: MeanModel<'a>,
     catalogue: &[Candidate],
 ) -> (MeanModel<'a>, Option<ModelFit<'a>>) {
-    let open = if model.has_outliers() { base.refit_ungated().ok() } else { None };
+    let outliers = |fit: &ModelFit<'_>| fit.solution.pass.outliers.len();
+    let is_sought = model.has_outliers() || outliers(base) > outliers(&model.found.model.fit);
+    let open = if is_sought { base.refit_ungated().ok() } else { None };
     let ungated = open.as_ref().and_then(|open| search_ungated((base, open), &model.found, catalogue));
     (ungated.map_or(model, MeanModel::of_effects), open)
 }
