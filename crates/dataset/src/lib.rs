@@ -7,7 +7,7 @@
 
 mod column_names;
 mod corrections;
-mod counted_rates;
+mod counted;
 mod counter;
 #[cfg(test)]
 mod draws;

@@ -10,15 +10,15 @@ use crate::record::WheelLog;
 use crate::settings::{DECIMAL_TOLERANCE, MAX_DECIMALS, MIN_DISTINCT_RATES};
 
 impl WheelLog {
-    /// The step that recorded speeds, or speed and yaw rate, are rounded to, m/s or rad/s: one, two or five
-    /// in the last decimal that any of them has. `None` for counts and angles, where values have more
-    /// decimals than `MAX_DECIMALS`, and where they are so few that the robot may have driven at these.
+    /// The step that recorded angles, speeds, or speed and yaw rate, are rounded to, rad, m/s or rad/s: one, two
+    /// or five in the last decimal that any of them has. `None` for counts, where values have more decimals than
+    /// `MAX_DECIMALS`, and where they are so few that the robot may have driven at these.
     #[must_use]
     pub fn recorded_step(&self) -> Option<f64> {
         let columns = match self {
-            Self::Speeds(speeds) => [&speeds.left, &speeds.right],
+            Self::Angles(wheels) | Self::Speeds(wheels) => [&wheels.left, &wheels.right],
             Self::Twist { v_mps, omega_radps } => [v_mps, omega_radps],
-            Self::Ticks(_) | Self::Angles(_) => return None,
+            Self::Ticks(_) => return None,
         };
         let values = || columns.into_iter().flatten().copied();
         let is_whole = |value: f64| (value - value.round()).abs() <= DECIMAL_TOLERANCE;
@@ -62,7 +62,8 @@ mod tests {
         assert_eq!(speeds(1e-7).recorded_step(), None);
         assert_eq!(speeds(0.5).recorded_step(), None, "two speeds forward and one back");
         let WheelLog::Speeds(Wheels { left, right }) = speeds(1e-2) else { panic!("speeds") };
-        assert_eq!(WheelLog::Angles(Wheels { left: left.clone(), right: right.clone() }).recorded_step(), None);
+        let counts: [Vec<i64>; 2] = [&left, &right].map(|of| of.iter().map(|speed| (100.0 * speed) as i64).collect());
+        assert_eq!(WheelLog::Ticks(Wheels { left: counts[0].clone(), right: counts[1].clone() }).recorded_step(), None);
         let third = left.iter().map(|speed| speed / 3.0).collect();
         assert_eq!(WheelLog::Twist { v_mps: third, omega_radps: right }.recorded_step(), None);
     }

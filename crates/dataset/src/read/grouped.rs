@@ -8,7 +8,7 @@ use super::columns::PointIndex;
 use super::truth::TruthTable;
 use super::{GYRO, Opened, has_truth, odometry, without_truth};
 use crate::corrections::Corrections;
-use crate::counted_rates;
+use crate::counted;
 use crate::error::DatasetError;
 use crate::record::{Dataset, NominalRobot, Run, RunInfo};
 use crate::table::{MARKED_ROWS, Survey};
@@ -86,7 +86,7 @@ impl Grouped {
         if has_truth(&run) {
             let mut run = unwrapped(run, robot);
             self.corrections.apply(&mut run);
-            counted_rates::restore(slice::from_mut(&mut run), robot);
+            counted::restore(slice::from_mut(&mut run), robot);
             return Ok(run);
         }
         let tables: Vec<_> = self.truths.iter().map(|(truth, _)| truth.name()).collect();
@@ -117,7 +117,7 @@ impl Grouped {
             truth.read_between(number, rows, (from_s, to_s), &self.points, &mut run)?;
         }
         let mut run = unwrapped(run, robot);
-        counted_rates::restore(slice::from_mut(&mut run), robot);
+        counted::restore(slice::from_mut(&mut run), robot);
         Ok(run)
     }
 }

@@ -14,7 +14,7 @@ mod truth;
 use std::path::{Path, PathBuf};
 
 use crate::corrections::Corrections;
-use crate::counted_rates;
+use crate::counted;
 use crate::counter;
 use crate::error::{DatasetError, shown};
 use crate::record::{Dataset, ExtraChannel, Run};
@@ -74,7 +74,7 @@ pub fn read(dir: &Path) -> Result<Loaded, DatasetError> {
         return Err(without_truth(manifest_file, line, run, &tables));
     }
     header.runs.iter_mut().for_each(|run| corrections.apply(run));
-    counted_rates::restore(&mut header.runs, &header.robot);
+    counted::restore(&mut header.runs, &header.robot);
     warnings.extend(counter::wrap_warnings(&header));
     Ok(Loaded { dataset: header, warnings })
 }

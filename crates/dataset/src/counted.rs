@@ -1,8 +1,8 @@
-//! Recorded rates that are made of counts.
+//! Recorded rates and angles that are made of counts.
 //!
-//! A driver that divides counts by the time between rows, and writes the quotient with few decimals, has not
-//! lost the counts: where they are farther apart than what was rounded, the nearest is the right one. The
-//! rounding of a rate stays for as long as the robot drives evenly; that of counts does not
+//! A driver that divides counts by the time between rows, or by those of a turn, and writes the quotient with
+//! few decimals, has not lost the counts: where they are farther apart than what was rounded, the nearest is
+//! the right one. The rounding of a rate stays for as long as the robot drives evenly; that of counts does not
 //! ([`crate::recorded_step`]).
 
 use std::collections::BTreeSet;
@@ -14,19 +14,74 @@ use crate::median::median;
 use crate::record::{NominalRobot, Run, WheelLog};
 use crate::settings::{COUNT_TOLERANCE, MAX_CHANCE_OF_COUNTS, MAX_ROUNDED_COUNTS, MIN_COUNTED_SHARE};
 
-/// Puts counts in place of recorded rates, where these are a whole number of the stated counts in a sampling
-/// period, or in the time since the row before, but for their rounding. Where a few rows are not, or rows are
-/// missing, of which nobody knows the counts, the rates of the others are put right. What a robot's runs say
-/// together decides.
+/// Puts counts in place of recorded angles, where these are a whole number of the stated counts but for their
+/// rounding, and of rates, where these are one in a sampling period, or in the time since the row before.
+/// Where a few rates are not, or rows are missing, of which nobody knows the counts, the rates of the others
+/// are put right. What a robot's runs say together decides.
 pub(crate) fn restore(runs: &mut [Run], robot: &NominalRobot) {
-    for has_even_rows in [true, false] {
-        let found: Vec<Option<CountedRates>> =
-            runs.iter().map(|run| CountedRates::of(run, robot, has_even_rows)).collect();
-        if are_counted(&found.iter().flatten().collect::<Vec<_>>()) {
+    fn restored<C: Counted>(runs: &mut [Run], of: impl Fn(&Run) -> Option<C>) -> bool {
+        let found: Vec<Option<C>> = runs.iter().map(of).collect();
+        let is_sure = are_counted(&found.iter().flatten().collect::<Vec<_>>());
+        if is_sure {
             let found = runs.iter_mut().zip(&found).filter_map(|(run, found)| Some((run, found.as_ref()?)));
             found.for_each(|(run, found)| found.apply(run));
-            return;
         }
+        is_sure
+    }
+    let _ = restored(runs, |run| CountedAngles::of(run, robot))
+        || restored(runs, |run| CountedRates::of(run, robot, true))
+        || restored(runs, |run| CountedRates::of(run, robot, false));
+}
+
+/// What a run may be made of.
+trait Counted {
+    /// By row; `None` where it is no whole number.
+    fn counts(&self) -> &[Option<Wheels<f64>>];
+
+    /// Counts that it is rounded by at the most.
+    fn rounded(&self) -> f64;
+
+    fn apply(&self, run: &mut Run);
+}
+
+/// The counts that the angles of a run may be made of, since the first row.
+struct CountedAngles {
+    counts: Vec<Option<Wheels<f64>>>,
+    rounded: f64,
+    /// Of the first row.
+    first: Wheels<f64>,
+}
+
+impl CountedAngles {
+    fn of(run: &Run, robot: &NominalRobot) -> Option<Self> {
+        let WheelLog::Angles(angles) = &run.odometry.wheels else { return None };
+        let rad_per_count = TAU / robot.ticks_per_rev?;
+        // Those of a row and of the first.
+        let rounded = run.odometry.wheels.recorded_step().unwrap_or(0.0) / rad_per_count;
+        let first = Wheels { left: *angles.left.first()?, right: *angles.right.first()? };
+        let of_row = |(left, right): (&f64, &f64)| {
+            let since_first = Wheels { left: left - first.left, right: right - first.right };
+            let nearest = since_first.map(|rad| nearest_count(rad / rad_per_count, rounded));
+            Some(Wheels { left: nearest.left?, right: nearest.right? })
+        };
+        let counts = angles.left.iter().zip(&angles.right).map(of_row).collect();
+        Some(Self { counts, rounded, first: first.map(|rad| (rad / rad_per_count).round()) })
+    }
+}
+
+impl Counted for CountedAngles {
+    fn counts(&self) -> &[Option<Wheels<f64>>] {
+        &self.counts
+    }
+
+    fn rounded(&self) -> f64 {
+        self.rounded
+    }
+
+    fn apply(&self, run: &mut Run) {
+        let Some(counts) = self.counts.iter().copied().collect::<Option<Vec<Wheels<f64>>>>() else { return };
+        let column = |side: Side| counts.iter().map(|of| (self.first[side] + of[side]) as i64).collect();
+        run.odometry.wheels = WheelLog::Ticks(Wheels::from_sides(column));
     }
 }
 
@@ -76,9 +131,25 @@ impl CountedRates {
         })
     }
 
-    /// Rows in which a wheel turns, or may.
-    fn moving(&self) -> impl Iterator<Item = &Option<Wheels<f64>>> {
-        self.counts.iter().filter(|of| **of != Some(Wheels::both(0.0)))
+    /// A wheel's counter since the first row, whose own counts are of an interval before the log.
+    fn counter(&self, side: Side) -> Vec<i64> {
+        let mut count = 0;
+        let next = |of: &Option<Wheels<f64>>| {
+            count += of.map_or(0, |of| of[side] as i64);
+            count
+        };
+        let since_first: Vec<i64> = self.counts.iter().skip(1).map(next).collect();
+        [0].into_iter().chain(since_first).collect()
+    }
+}
+
+impl Counted for CountedRates {
+    fn counts(&self) -> &[Option<Wheels<f64>>] {
+        &self.counts
+    }
+
+    fn rounded(&self) -> f64 {
+        self.rounded
     }
 
     fn apply(&self, run: &mut Run) {
@@ -98,17 +169,6 @@ impl CountedRates {
                 WheelLog::Ticks(_) | WheelLog::Angles(_) => {}
             }
         }
-    }
-
-    /// A wheel's counter since the first row, whose own counts are of an interval before the log.
-    fn counter(&self, side: Side) -> Vec<i64> {
-        let mut count = 0;
-        let next = |of: &Option<Wheels<f64>>| {
-            count += of.map_or(0, |of| of[side] as i64);
-            count
-        };
-        let since_first: Vec<i64> = self.counts.iter().skip(1).map(next).collect();
-        [0].into_iter().chain(since_first).collect()
     }
 }
 
@@ -135,15 +195,15 @@ fn nearest_count(counts: f64, rounded: f64) -> Option<f64> {
     (rounded <= MAX_ROUNDED_COUNTS && (counts - nearest).abs() <= rounded + COUNT_TOLERANCE).then_some(nearest)
 }
 
-/// Are nearly all rows in which a wheel turns made of counts, and of so many numbers that it is no chance? A
-/// rate of no counts is within the rounding of one with twice that probability, and a robot that drives evenly
-/// says the same again and again.
-fn are_counted(runs: &[&CountedRates]) -> bool {
-    let moving = || runs.iter().flat_map(|run| run.moving());
+/// Are nearly all rows in which a wheel turned made of counts, and of so many numbers that it is no chance?
+/// What is not made of counts is within the rounding of one with twice that probability, and a robot that drives
+/// evenly says the same again and again.
+fn are_counted(runs: &[&impl Counted]) -> bool {
+    let moving = || runs.iter().flat_map(|run| run.counts()).filter(|of| **of != Some(Wheels::both(0.0)));
     let counted: Vec<&Wheels<f64>> = moving().flatten().collect();
     let numbers: BTreeSet<(Side, i64)> =
         counted.iter().flat_map(|of| Side::BOTH.map(|side| (side, of[side] as i64))).collect();
-    let rounded = runs.iter().map(|run| run.rounded).fold(0.0, f64::max);
+    let rounded = runs.iter().map(|run| run.rounded()).fold(0.0, f64::max);
     let log_chance = numbers.len() as f64 * (2.0 * (rounded + COUNT_TOLERANCE)).ln();
     log_chance <= MAX_CHANCE_OF_COUNTS.ln() && counted.len() as f64 >= MIN_COUNTED_SHARE * moving().count() as f64
 }
@@ -251,5 +311,24 @@ mod tests {
         let mut after = before.clone();
         restore(std::slice::from_mut(&mut after), &NominalRobot { ticks_per_rev: Some(437.0), ..ROBOT });
         assert_eq!(after.odometry.wheels, before.odometry.wheels);
+    }
+
+    #[test]
+    fn angles_of_counts_are_the_counts() {
+        let count = |share: f64| (0..400).map(move |row| (1000.0 + share * f64::from(row * row) / 90.0).floor());
+        let of = |ticks_per_rev: f64, step_rad: f64| {
+            let angles = |share: f64| {
+                count(share).map(|count| (count / 500.0 * TAU / step_rad).round() * step_rad).collect::<Vec<f64>>()
+            };
+            let wheels = WheelLog::Angles(Wheels { left: angles(1.0), right: angles(-0.61) });
+            let mut run = Run { odometry: Odometry { wheels, ..Odometry::default() }, ..Run::default() };
+            restore(std::slice::from_mut(&mut run), &NominalRobot { ticks_per_rev: Some(ticks_per_rev), ..ROBOT });
+            run.odometry.wheels
+        };
+        let ticks = |share: f64| count(share).map(|count| count as i64).collect::<Vec<i64>>();
+        assert_eq!(of(500.0, 1e-3), WheelLog::Ticks(Wheels { left: ticks(1.0), right: ticks(-0.61) }));
+        // A count is 12.6 mrad.
+        assert!(matches!(of(500.0, 1e-2), WheelLog::Angles(_)), "a rounding of most of a count");
+        assert!(matches!(of(437.0, 1e-3), WheelLog::Angles(_)), "another number of counts");
     }
 }
