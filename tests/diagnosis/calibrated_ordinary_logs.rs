@@ -19,14 +19,14 @@ use crate::plain_robot::PlainRobot;
 const LENGTHS: [&str; 3] = ["left_wheel_diameter_m", "right_wheel_diameter_m", "wheel_separation_m"];
 
 /// What `calibrate` says.
-struct Calibrated {
-    is_refused: bool,
-    said: String,
+pub(crate) struct Calibrated {
+    pub(crate) is_refused: bool,
+    pub(crate) said: String,
     /// Errors of what is determined, over their standard deviations.
-    z: Vec<f64>,
+    pub(crate) z: Vec<f64>,
 }
 
-fn calibrated(folder: &Path, truth_m: [f64; 3]) -> Calibrated {
+pub(crate) fn calibrated(folder: &Path, truth_m: [f64; 3]) -> Calibrated {
     let mut command = Command::new(env!("CARGO_BIN_EXE_yair"));
     let output = command.args(["calibrate", "--json"]).arg(folder).output().expect("it runs");
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -41,14 +41,6 @@ fn calibrated(folder: &Path, truth_m: [f64; 3]) -> Calibrated {
         Some((of["value"].as_f64()? - truth_m) / of["sigma"].as_f64()?)
     });
     Calibrated { is_refused: false, said, z: z.collect() }
-}
-
-/// Errors over their standard deviations, or what is said instead.
-pub(crate) fn lengths(folder: &Path, truth_m: [f64; 3]) -> String {
-    let found = calibrated(folder, truth_m);
-    let z: Vec<String> = found.z.iter().map(|z| format!("{z:+.1}")).collect();
-    let said = found.said.replace('\n', " / ");
-    format!("{}{} {said}", if found.is_refused { "refused " } else { "" }, z.join(" "))
 }
 
 fn of_robot(change: Change, seed: u64) -> Calibrated {
