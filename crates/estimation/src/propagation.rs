@@ -250,9 +250,46 @@ impl<'f, 'a> Propagator<'f, 'a> {
             let world_from_body = self.run_from_chain * pose;
             let measurement = Measurement { t_s, world_from_body, twist, record: &record, run: self.segment.info };
             self.ask_terms(|term, own| term.measurement(&measurement, own));
+            self.turn_levers();
         }
         if let PropagationSource::Recorded(cached) = &mut self.propagations {
             cached.keep_measurement(propagations, &self.gradients);
+        }
+    }
+
+    /// Where a term is of the body elsewhere, the point that is seen on the body turns with it.
+    fn turn_levers(&mut self) {
+        let values = &self.model.term_values;
+        let value = |column: usize| values.get(column).copied().unwrap_or(0.0);
+        let mut lever_m = [self.model.body_from_sensor.x_m, self.model.body_from_sensor.y_m];
+        let mut at = 0;
+        for term in self.terms.iter() {
+            let own = at..at + term.parameters().len();
+            at = own.end;
+            for column in own.filter(|column| value(*column) != 0.0 && !term.moves_body()) {
+                lever_m[0] += value(column) * self.gradients[column].x_m;
+                lever_m[1] += value(column) * self.gradients[column].y_m;
+            }
+        }
+        if lever_m == [0.0; 2] {
+            return;
+        }
+        let [ahead_m, left_m] = lever_m;
+        let mut at = 0;
+        for term in self.terms.iter() {
+            let own = at..at + term.parameters().len();
+            at = own.end;
+            for column in own.filter(|_| term.moves_body()) {
+                let (gradient, value) = (&mut self.gradients[column], value(column));
+                let (turned, shrunk) = if value == 0.0 {
+                    (gradient.theta_rad, 0.0)
+                } else {
+                    let (sin, cos) = (value * gradient.theta_rad).sin_cos();
+                    (sin / value, (cos - 1.0) / value)
+                };
+                gradient.x_m += shrunk * ahead_m - turned * left_m;
+                gradient.y_m += shrunk * left_m + turned * ahead_m;
+            }
         }
     }
 

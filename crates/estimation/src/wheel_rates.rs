@@ -12,7 +12,7 @@ use kinematics::Wheels;
 use crate::settings::{
     GAP_RATIO, GENTLE_ACCELERATION_M_S2, MAX_EXACT_JITTER, MAX_ROUNDING_S, MAX_ROW_RATE_NOISE, MAX_STEADY_ROW_S,
     MIN_BEAT_JITTER, MIN_GRID_FRACTION, MIN_GRID_STEPS, MIN_QUANTUM_RAD, QUANTUM_TOLERANCE, RATE_NOISE_FRACTION,
-    RATE_WINDOWS,
+    RATE_ROUNDING_FRACTION, RATE_WINDOWS,
 };
 
 /// Rates at the rows of a run.
@@ -76,16 +76,21 @@ impl WheelRates {
                 .iter()
                 .all(|&side| 2.0 * variance[side] / (stretch_s * stretch_s) <= MAX_ROW_RATE_NOISE * mean_square[side]);
         let of_window = |half: usize| turns.map(|turn_rad| slopes(t_s, turn_rad, &pieces, half));
-        let noise = |half: usize| {
+        let over_window = |variance: [f64; 2], half: usize| {
             let half = half as f64;
             let squares = half * (half + 1.0) * (2.0 * half + 1.0) / 3.0 * stretch_s * stretch_s;
             variance.map(|variance| variance / squares)
         };
+        let noise = |half: usize| over_window(variance, half);
+        let rounding = quanta.map(|quantum| quantum.powi(2) / 12.0);
         let mut rates = of_window(RATE_WINDOWS[0]);
         let mut half_rows = RATE_WINDOWS[0];
         for pair in RATE_WINDOWS.windows(2) {
             let [now, wider] = [noise(pair[0]), noise(pair[1])];
-            if is_below_signal(&rates, now, separation_m, m_per_rad) || variance == [0.0; 2] {
+            let is_below = |noise, fraction| is_below_signal(&rates, noise, fraction, separation_m, m_per_rad);
+            let is_enough =
+                is_below(now, RATE_NOISE_FRACTION) && is_below(over_window(rounding, pair[0]), RATE_ROUNDING_FRACTION);
+            if is_enough || variance == [0.0; 2] {
                 break;
             }
             let next = of_window(pair[1]);
@@ -160,15 +165,21 @@ pub(crate) fn quantum_of_angles(angle_rad: &[f64]) -> f64 {
     if on_grid >= MIN_GRID_FRACTION * all { quantum } else { 0.0 }
 }
 
-/// Is the noise of the rates of the centre and of the turn below what is wanted of their own variance?
-fn is_below_signal(rates: &[Vec<f64>; 2], noise: [f64; 2], separation_m: f64, m_per_rad: [f64; 2]) -> bool {
+/// Is the noise of the rates of the centre and of the turn below a fraction of their own variance?
+fn is_below_signal(
+    rates: &[Vec<f64>; 2],
+    noise: [f64; 2],
+    fraction: f64,
+    separation_m: f64,
+    m_per_rad: [f64; 2],
+) -> bool {
     let of = |weights: [f64; 2]| {
         let noise: f64 = (0..2).map(|side| (weights[side] * m_per_rad[side]).powi(2) * noise[side]).sum();
         let speed = |row: usize| (0..2).map(|side| weights[side] * m_per_rad[side] * rates[side][row]).sum::<f64>();
         let rows = rates[0].len();
         let middle = mean((0..rows).map(speed));
         let variance = mean((0..rows).map(|row| (speed(row) - middle).powi(2)));
-        noise <= RATE_NOISE_FRACTION * (variance - noise)
+        noise <= fraction * (variance - noise)
     };
     of([0.5, 0.5]) && of([-1.0 / separation_m, 1.0 / separation_m])
 }

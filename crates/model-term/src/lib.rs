@@ -177,6 +177,12 @@ pub trait ModelTerm: CopyTerm + Send + Sync {
         let _ = (interval, gradient);
     }
 
+    /// Whether its measurement is of the body elsewhere, as where it is of another instant: what is seen on the
+    /// body turns with it.
+    fn moves_body(&self) -> bool {
+        false
+    }
+
     /// Derivative of the pose that the instrument measures, in the frame of the measured body (x, y, θ), by
     /// each parameter, at zero size. `gradient` is as above.
     fn measurement(&mut self, measurement: &Measurement<'_>, gradient: &mut [Pose]) {

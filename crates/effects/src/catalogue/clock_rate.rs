@@ -96,6 +96,10 @@ impl ModelTerm for Term {
         &[TermParameter { name: "rate", unit: "1", prior_sigma: 0.03 }]
     }
 
+    fn moves_body(&self) -> bool {
+        true
+    }
+
     fn linearize_at(&mut self, values: &[f64]) {
         self.rate = values.first().copied().unwrap_or(0.0);
     }

@@ -89,6 +89,10 @@ impl ModelTerm for Term {
         &[TermParameter { name: "delay_s", unit: "s", prior_sigma: 0.1 }]
     }
 
+    fn moves_body(&self) -> bool {
+        true
+    }
+
     fn linearize_at(&mut self, values: &[f64]) {
         self.delay_s = values.first().map_or(0.0, |delay_s| delay_s.clamp(-LONGEST_S, LONGEST_S));
     }

@@ -121,9 +121,13 @@ pub(crate) const MIN_CHORD_RATIO: f64 = 0.3;
 pub(crate) const RATE_WINDOWS: [usize; 12] = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 40, 48];
 
 /// Variance of a rate's noise, over that of the rate itself, at which a window is wide enough.
+/// Budgeted: a term's size is then estimated a tenth too small at the most (errors in variables).
+pub(crate) const RATE_NOISE_FRACTION: f64 = 0.1;
+
+/// The same of the noise that is the rounding of counts.
 /// Budgeted: accelerations, by which delays show, are a tenth of the speeds and rarer; at 0.1 delays were not
 /// resolved with 264 counts a turn. Wider windows blur first where encoders are coarse.
-pub(crate) const RATE_NOISE_FRACTION: f64 = 0.001;
+pub(crate) const RATE_ROUNDING_FRACTION: f64 = 0.01;
 
 /// Variance of the noise of a single row's rate, over the rates' mean square, up to which a row's speed is
 /// taken from its own counts.
