@@ -4,8 +4,9 @@
 //! same row has it too, and the product of both is not zero on average: terms in speed and acceleration, and
 //! latencies, are then biased by several standard deviations (errors in variables; Fuller 1987). A rate from
 //! as many rows before as after, weighted alike, does not have it. Rates are slopes of local regressions over
-//! 2m + 1 rows, m as small as it may be: the smallest at which their noise is below a thousandth of the signal's
-//! variance, unless a wider one blurs more than it averages out (Savitzky & Golay 1964; Lepski 1990).
+//! 2m + 1 rows, m as small as it may be: the smallest at which their noise is below a tenth of the signal's
+//! variance, and that of the rounding below a hundredth, unless a wider one blurs more than it averages out
+//! (Savitzky & Golay 1964; Lepski 1990).
 
 use kinematics::Wheels;
 

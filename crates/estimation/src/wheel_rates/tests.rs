@@ -36,19 +36,19 @@ fn a_rate_does_not_have_its_own_rows_rounding() {
 }
 
 #[test]
-fn windows_grow_with_the_rounding_until_it_is_below_a_tenth_of_the_signal() {
+fn windows_grow_with_the_rounding_until_it_is_below_a_hundredth_of_the_signal() {
     // Over h rows before and after, 10 ms each, a rate's noise is q²/12 over h(h + 1)(2h + 1)/3 · 10⁻⁴ s².
-    // For 0.02 rad that is 0.033 and 0.012 rad²/s² of two and three rows, for 0.05 rad 0.035 and 0.011 of
-    // four and six: the limit below lies between.
-    for (quantum_rad, half_rows) in [(0.0, 1), (1e-4, 1), (2e-3, 1), (2e-2, 3), (5e-2, 6)] {
+    // For 0.02 rad that is 5.6e-3 and 1.8e-3 rad²/s² of four and six rows, for 0.05 rad 5.1e-3 and 1.6e-3 of
+    // eight and twelve: the limit below lies between.
+    for (quantum_rad, half_rows) in [(0.0, 1), (1e-4, 1), (2e-3, 1), (2e-2, 6), (5e-2, 12)] {
         let found = rates(quantum_rad);
         assert_eq!(found.window.rows, half_rows, "{quantum_rad}");
         let exact = |t_s: f64| 3.0 + 1.65 * (1.1 * t_s).sin();
         let errors = (50..750).map(|row| found.at_row(row).left - exact(0.01 * row as f64));
         let noise = mean(errors.map(|error| error * error));
         // Each wheel's rate varies by 1.65²/2; the turn, of the difference of two, by 0.32 of that. A
-        // tenth of it, for both wheels.
-        assert!(noise < 0.1 * 0.5 * 1.65 * 1.65 * 0.24, "{quantum_rad}: {noise}");
+        // hundredth of it, for both wheels.
+        assert!(noise < 0.01 * 0.5 * 1.65 * 1.65 * 0.24, "{quantum_rad}: {noise}");
         assert_eq!(found.window.row_by_row, quantum_rad < 1e-2, "{quantum_rad}");
     }
 }
@@ -204,7 +204,8 @@ fn a_rates_noise_counts_against_what_is_left_of_its_variance() {
     let alike = [vec![1.0, -1.0, 1.0, -1.0], vec![1.0, -1.0, 1.0, -1.0]];
     let opposite = [vec![1.0, -1.0, 1.0, -1.0], vec![-1.0, 1.0, -1.0, 1.0]];
     let both = [vec![1.0, -1.0, 1.0, -1.0], vec![1.0, 1.0, -1.0, -1.0]];
-    let is_below = |rates: &[Vec<f64>; 2], noise: f64| is_below_signal(rates, [noise; 2], 0.4, [0.1; 2]);
+    let is_below =
+        |rates: &[Vec<f64>; 2], noise: f64| is_below_signal(rates, [noise; 2], RATE_NOISE_FRACTION, 0.4, [0.1; 2]);
     // Neither a robot that only drives nor one that only turns has a signal in both.
     assert!(!is_below(&alike, 1e-6) && !is_below(&opposite, 1e-6));
     // Of independent wheels the centre has the variance ½ · 0.01 and, of noise n, ½ · 0.01 n: a tenth of
