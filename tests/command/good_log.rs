@@ -77,7 +77,8 @@ pub(crate) fn driven(true_m: [f64; 3], seed: u64) -> Log {
             for _ in 0..(length_s / step_s).round() as usize {
                 let t_s = step_s * f64::from(count);
                 if count % 4 == 0 {
-                    // Rates are even within a step: at an instant they are the mean of those before and after.
+                    // Rates are even within a step: at an instant they are the mean of those before and
+                    // after.
                     let [v_now, omega_now] = [(v, speed), (omega, rate)]
                         .map(|(of, goal): (f64, f64)| of + 0.5 * (goal - of) * step_s / lag_s);
                     // What the stated robot would do with the wheels' rates.

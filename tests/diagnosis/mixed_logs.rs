@@ -1,8 +1,9 @@
 //! Logs that several ordinary things are true of at once, drawn at random, of robots that this project's
 //! simulator did not drive ([`crate::plain_robot`]); with nothing wrong, or with one thing.
 //!
-//! Kinds of ordinary logs ([`crate::ordinary_kinds`]) differ from a good log in one thing each. A user's differs
-//! in many. The campaign: `YAIR_ROBOTS=200 cargo test --release --test diagnosis mixed -- --nocapture`.
+//! Kinds of ordinary logs ([`crate::ordinary_kinds`]) differ from a good log in one thing each. A user's
+//! differs in many. The campaign: `YAIR_ROBOTS=200 cargo test --release --test diagnosis mixed --
+//! --nocapture`.
 #![allow(clippy::print_stdout)] // every case with its seed
 
 use std::path::Path;
@@ -261,8 +262,8 @@ impl Mixed {
     }
 }
 
-/// Diagnoses and calibrates the log of a seed: the verdict, whether there is a fault, the errors of the lengths
-/// where nothing is wrong, and a line of all.
+/// Diagnoses and calibrates the log of a seed: the verdict, whether there is a fault, the errors of the
+/// geometry where nothing is wrong, and a line of all.
 fn of_seed(seed: u64) -> (Verdict, bool, Vec<f64>, String) {
     let drawn = Mixed::drawn(seed);
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -308,10 +309,12 @@ fn logs_that_differ_in_several_things_are_diagnosed_and_calibrated() {
     let z: Vec<f64> = all.iter().flat_map(|(_, _, z, _)| z.iter().copied()).collect();
     let rms = (z.iter().map(|z| z * z).sum::<f64>() / z.len() as f64).sqrt();
     println!("RMS z of the lengths of sound robots {rms:.2}, of {}", z.len());
-    // One in ten is diagnosed wrongly (docs/diagnosis-benchmark.md); more than this many have a chance below 1e-3.
+    // One in ten is diagnosed wrongly (docs/diagnosis-benchmark.md); more than this many have a chance below
+    // 1e-3.
     let binomial = Binomial::new(0.1, all.len() as u64).expect("a rate");
     let bound = (0..all.len() as u64).find(|count| binomial.sf(*count) < 1e-3).unwrap_or(0);
     let wrong = count(Verdict::Wrong, false) + count(Verdict::Wrong, true);
-    // Three lengths of a robot share their errors: the mean square of ten robots is below 2.5 but once in 1e3.
+    // Geometry parameters of a robot share their errors: the mean square of ten robots is below 2.5 but once
+    // in 1e3.
     assert!(wrong <= bound && rms < 1.6, "{wrong} of {bound}, RMS {rms}");
 }

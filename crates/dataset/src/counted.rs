@@ -2,8 +2,8 @@
 //!
 //! A driver that divides counts by the time between rows, or by those of a turn, and writes the quotient with
 //! few decimals, has not lost the counts: where they are farther apart than what was rounded, the nearest is
-//! the right one. The rounding of a rate stays for as long as the robot drives evenly; that of counts does not
-//! ([`crate::recorded_step`]).
+//! the right one. The rounding of a rate stays for as long as the robot drives evenly; that of counts does
+//! not ([`crate::recorded_step`]).
 
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
@@ -21,12 +21,12 @@ use crate::settings::{COUNT_TOLERANCE, MAX_CHANCE_OF_COUNTS, MAX_ROUNDED_COUNTS,
 pub(crate) fn restore(runs: &mut [Run], robot: &NominalRobot) {
     fn restored<C: Counted>(runs: &mut [Run], of: impl Fn(&Run) -> Option<C>) -> bool {
         let found: Vec<Option<C>> = runs.iter().map(of).collect();
-        let is_sure = are_counted(&found.iter().flatten().collect::<Vec<_>>());
-        if is_sure {
+        let is_certain = are_counted(&found.iter().flatten().collect::<Vec<_>>());
+        if is_certain {
             let found = runs.iter_mut().zip(&found).filter_map(|(run, found)| Some((run, found.as_ref()?)));
             found.for_each(|(run, found)| found.apply(run));
         }
-        is_sure
+        is_certain
     }
     let _ = restored(runs, |run| CountedAngles::of(run, robot))
         || restored(runs, |run| CountedRates::of(run, robot, true))
@@ -189,15 +189,16 @@ fn wheel_speeds_m_s(wheels: &WheelLog, geometry: &DriveGeometry, step: f64) -> O
     }
 }
 
-/// The nearest whole number of counts; `None` where the rounding leaves open which it is, or none is within it.
+/// The nearest whole number of counts; `None` where the rounding leaves open which it is, or none is within
+/// it.
 fn nearest_count(counts: f64, rounded: f64) -> Option<f64> {
     let nearest = counts.round();
     (rounded <= MAX_ROUNDED_COUNTS && (counts - nearest).abs() <= rounded + COUNT_TOLERANCE).then_some(nearest)
 }
 
 /// Are nearly all rows in which a wheel turned made of counts, and of so many numbers that it is no chance?
-/// What is not made of counts is within the rounding of one with twice that probability, and a robot that drives
-/// evenly says the same again and again.
+/// What is not made of counts is within the rounding of one with twice that probability, and a robot that
+/// drives evenly says the same again and again.
 fn are_counted(runs: &[&impl Counted]) -> bool {
     let moving = || runs.iter().flat_map(|run| run.counts()).filter(|of| **of != Some(Wheels::both(0.0)));
     let counted: Vec<&Wheels<f64>> = moving().flatten().collect();

@@ -10,9 +10,9 @@ use crate::record::WheelLog;
 use crate::settings::{DECIMAL_TOLERANCE, MAX_DECIMALS, MIN_DISTINCT_RATES};
 
 impl WheelLog {
-    /// The step that recorded angles, speeds, or speed and yaw rate, are rounded to, rad, m/s or rad/s: one, two
-    /// or five in the last decimal that any of them has. `None` for counts, where values have more decimals than
-    /// `MAX_DECIMALS`, and where they are so few that the robot may have driven at these.
+    /// The step that recorded angles, speeds, or speed and yaw rate, are rounded to, rad, m/s or rad/s: one,
+    /// two or five in the last decimal that any of them has. `None` for counts, where values have more
+    /// decimals than `MAX_DECIMALS`, and where they are so few that the robot may have driven at these.
     #[must_use]
     pub fn recorded_step(&self) -> Option<f64> {
         let columns = match self {

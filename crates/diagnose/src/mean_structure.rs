@@ -230,8 +230,9 @@ fn autocorrelation_by_part(
     (!is_white(&checked)).then_some(Autocorrelation { correlation: checked.correlation, ..of_part })
 }
 
-/// A large effect in few measurements looks like outliers: what a search without a gate finds, where there are
-/// more of them than noise makes, or than beside the effects that were found, and the fit to all measurements.
+/// A large effect in few measurements looks like outliers: what a search without a gate finds, where there
+/// are more of them than noise makes, or than beside the effects that were found, and the fit to all
+/// measurements.
 fn search_ungated_if_outliers<'a>(
     base: &ModelFit<'a>,
     model: MeanModel<'a>,

@@ -29,8 +29,8 @@ pub(crate) fn unresolved(fit: &ModelFit<'_>, chosen: &[Candidate], scored: &[Sco
     of.map(|(scored, _)| scored.candidate.clone()).collect()
 }
 
-/// Share of the motion in a candidate's information, by that under noise added once more: of all directions in
-/// which it is detectable together. Negative where the noise is more than the motion.
+/// Share of the motion in a candidate's information, by that under noise added once more: of all directions
+/// in which it is detectable together. Negative where the noise is more than the motion.
 fn reliability(parameters: &[TermParameter], own: &DMatrix<f64>, noisier: &DMatrix<f64>) -> f64 {
     let eigen = prior_scaled(own, parameters).symmetric_eigen();
     let noisier = prior_scaled(noisier, parameters);

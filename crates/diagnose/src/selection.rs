@@ -109,8 +109,8 @@ fn possible_rivals<'a>(
 /// The model without the effects that only cancel each other: two that were found in the place of a third
 /// stay significant beside it, each given the other, and two that no third stands for fit the driving that
 /// was recorded by the difference of two large errors, and fail on any other. Of all subsets of the effects
-/// that do not cancel each other, the smallest that the log Bayes factor does not discriminate from the best, by
-/// more than what may be the error of its own effects' form.
+/// that do not cancel each other, the smallest that the log Bayes factor does not discriminate from the best,
+/// by more than what may be the error of its own effects' form.
 fn without_what_cancels<'a>(
     (base, known): (&ModelFit<'a>, &mut FitCache<'a>),
     model: AugmentedModel<'a>,

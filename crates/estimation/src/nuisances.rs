@@ -144,8 +144,8 @@ fn hidden_directions(fit: &ModelFit<'_>) -> usize {
 }
 
 /// Autocorrelated innovations and outliers may be due to wrong extrinsics or latency. Fits these without
-/// thinning and without the gate. The fit is accepted if the one without nuisances has more than twice as many
-/// outliers, each thinned as it needs it, or if that alone needs thinning.
+/// thinning and without the gate. The fit is accepted if the one without nuisances has more than twice as
+/// many outliers, each thinned as it needs it, or if that alone needs thinning.
 pub(crate) fn explained_by_nuisances<'a>(
     fit: &ModelFit<'a>,
     thin: bool,

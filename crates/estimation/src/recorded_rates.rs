@@ -87,8 +87,8 @@ fn count_rad_s(run: &RunView<'_>, robot: &NominalRobot) -> f64 {
 const FIFTH: ([f64; 6], f64, f64) = ([-1.0, 5.0, -10.0, 10.0, -5.0, 1.0], 252.0, 16.0);
 
 /// Variance of what dithers values that are rounded to whole numbers: of their noise beside that of the
-/// rounding, by fifth differences in motion, by the median of their squares, as those of a robot that sets off
-/// are large. `counted` is what one count of each wheel makes of a value. Where that is so much that an
+/// rounding, by fifth differences in motion, by the median of their squares, as those of a robot that sets
+/// off are large. `counted` is what one count of each wheel makes of a value. Where that is so much that an
 /// interval of rounding has hardly two numbers of counts, their noise is no dither: one count more in every
 /// other row is all that it can be. Of finer speeds that are made of counts, the rounding of two counts has
 /// nearly twice its variance in fifth differences, and is on a grid, which dithers less: a quarter counts.

@@ -177,8 +177,8 @@ pub trait ModelTerm: CopyTerm + Send + Sync {
         let _ = (interval, gradient);
     }
 
-    /// Whether its measurement is of the body elsewhere, as where it is of another instant: what is seen on the
-    /// body turns with it.
+    /// Whether its measurement is of the body elsewhere, as where it is of another instant: what is seen on
+    /// the body turns with it.
     fn moves_body(&self) -> bool {
         false
     }

@@ -11,6 +11,7 @@ mod poses_between_rows;
 mod recorded_rates;
 mod start_headings;
 mod thinning;
+mod wheel_rates;
 
 pub(crate) use driving::{CRUISE_QUANTILE, RISE_QUANTILE, RISE_SPEED_RATIOS};
 pub(crate) use map::{
@@ -26,6 +27,7 @@ pub(crate) use poses_between_rows::{MAX_INTERPOLATED_VARIANCE_RATIO, MAX_SHARED_
 pub(crate) use recorded_rates::{MAX_SHARED_RATES, MIN_COUNT_STEPS};
 pub(crate) use start_headings::{HEADING_STEP_TOLERANCE_RAD, START_HEADING_BASELINE_M, START_HEADING_PRECISION};
 pub(crate) use thinning::{MIN_MEASUREMENTS_PER_RUN, SPACING_SLACK, THINNING_FACTOR, THINNING_PHASES};
+pub(crate) use wheel_rates::{MAX_ROW_RATE_NOISE, RATE_NOISE_FRACTION, RATE_ROUNDING_FRACTION, RATE_WINDOWS};
 
 // Numbers of arithmetic.
 
@@ -114,25 +116,7 @@ pub(crate) const ROTATED_SENSOR_RAD: f64 = 0.2;
 /// Tuned: by hand; no record of what on.
 pub(crate) const MIN_CHORD_RATIO: f64 = 0.3;
 
-// Rates of the wheels.
-
-/// Widths of the windows of rows by which rates are found, in turn: rows before, and as many after.
-/// Budgeted: steps of a factor of about 1.4; with 48 rows of 100 Hz a second is blurred.
-pub(crate) const RATE_WINDOWS: [usize; 12] = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 40, 48];
-
-/// Variance of a rate's noise, over that of the rate itself, at which a window is wide enough.
-/// Budgeted: a term's size is then estimated a tenth too small at the most (errors in variables).
-pub(crate) const RATE_NOISE_FRACTION: f64 = 0.1;
-
-/// The same of the noise that is the rounding of counts.
-/// Budgeted: accelerations, by which delays show, are a tenth of the speeds and rarer; at 0.1 delays were not
-/// resolved with 264 counts a turn. Wider windows blur first where encoders are coarse.
-pub(crate) const RATE_ROUNDING_FRACTION: f64 = 0.01;
-
-/// Variance of the noise of a single row's rate, over the rates' mean square, up to which a row's speed is
-/// taken from its own counts.
-/// Budgeted: 3 % of the speed; the square of it biases terms by a thousandth.
-pub(crate) const MAX_ROW_RATE_NOISE: f64 = 1e-3;
+// The log's stretches.
 
 /// Length of a row, over the median, from which on it is a gap: no rate is taken across it.
 /// Budgeted: one lost row is bridged.

@@ -37,8 +37,8 @@ pub(crate) fn found(check: &mut SessionCheck, dataset: &Dataset) {
         return;
     }
     // Rates of the instant, taken for those of the interval, make poses late by half a row and no more. Poses
-    // that are late by something else gain by that half too; and the mean of two rows is less noisy where stamps
-    // or rates are.
+    // that are late by something else gain by that half too; and the mean of two rows is less noisy where
+    // stamps or rates are.
     let Some(delayed) = interval.best_offset(false) else { return };
     let Some(as_stamped) = interval.at(Clock::default()) else { return };
     let half_row_s = 0.5 * mean_interval_s(&check.runs);

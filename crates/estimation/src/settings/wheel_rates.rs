@@ -1,0 +1,19 @@
+//! Of the rates of the wheels.
+
+/// Widths of the windows of rows by which rates are found, in turn: rows before, and as many after.
+/// Budgeted: steps of a factor of about 1.4; with 48 rows of 100 Hz a second is blurred.
+pub(crate) const RATE_WINDOWS: [usize; 12] = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 40, 48];
+
+/// Variance of a rate's noise, over that of the rate itself, at which a window is wide enough.
+/// Budgeted: a term's size is then estimated a tenth too small at the most (errors in variables).
+pub(crate) const RATE_NOISE_FRACTION: f64 = 0.1;
+
+/// The same of the noise that is the rounding of counts.
+/// Budgeted: accelerations, by which delays show, are a tenth of the speeds and rarer; at 0.1 delays were not
+/// resolved with 264 counts a turn. Wider windows blur first where encoders are coarse.
+pub(crate) const RATE_ROUNDING_FRACTION: f64 = 0.01;
+
+/// Variance of the noise of a single row's rate, over the rates' mean square, up to which a row's speed is
+/// taken from its own counts.
+/// Budgeted: 3 % of the speed; the square of it biases terms by a thousandth.
+pub(crate) const MAX_ROW_RATE_NOISE: f64 = 1e-3;
