@@ -12,7 +12,7 @@ use kinematics::{DriveGeometry, Side, Twist, Wheels};
 
 use crate::median::median;
 use crate::record::{NominalRobot, Run, WheelLog};
-use crate::settings::{COUNT_TOLERANCE, MAX_CHANCE_OF_COUNTS, MAX_ROUNDED_COUNTS, MIN_COUNTED_SHARE};
+use crate::settings::{COUNT_TOLERANCE, MAX_CHANCE_OF_COUNTS, MAX_COUNTS, MAX_ROUNDED_COUNTS, MIN_COUNTED_SHARE};
 
 /// Puts counts in place of recorded angles, where these are a whole number of the stated counts but for their
 /// rounding, and of rates, where these are one in a sampling period, or in the time since the row before.
@@ -189,11 +189,12 @@ fn wheel_speeds_m_s(wheels: &WheelLog, geometry: &DriveGeometry, step: f64) -> O
     }
 }
 
-/// The nearest whole number of counts; `None` where the rounding leaves open which it is, or none is within
-/// it.
+/// The nearest whole number of counts; `None` where the rounding leaves open which it is, none is within it, or
+/// there are so many that any number is whole.
 fn nearest_count(counts: f64, rounded: f64) -> Option<f64> {
     let nearest = counts.round();
-    (rounded <= MAX_ROUNDED_COUNTS && (counts - nearest).abs() <= rounded + COUNT_TOLERANCE).then_some(nearest)
+    let is_within = (counts - nearest).abs() <= rounded + COUNT_TOLERANCE;
+    (is_within && rounded <= MAX_ROUNDED_COUNTS && nearest.abs() <= MAX_COUNTS).then_some(nearest)
 }
 
 /// Are nearly all rows in which a wheel turned made of counts, and of so many numbers that it is no chance?

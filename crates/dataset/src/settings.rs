@@ -67,3 +67,7 @@ pub(crate) const MIN_COUNTED_SHARE: f64 = 0.98;
 /// Probability at the most that rates which are not made of counts are within their rounding of such.
 /// Budgeted: one log in 1e12.
 pub(crate) const MAX_CHANCE_OF_COUNTS: f64 = 1e-12;
+
+/// Counts of a counter that are told from others by a number of double precision, and of any log.
+/// Derived: a number of 1e12 has steps of 1e-4, far below the tolerance.
+pub(crate) const MAX_COUNTS: f64 = 1e12;
