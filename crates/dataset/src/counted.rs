@@ -189,8 +189,8 @@ fn wheel_speeds_m_s(wheels: &WheelLog, geometry: &DriveGeometry, step: f64) -> O
     }
 }
 
-/// The nearest whole number of counts; `None` where the rounding leaves open which it is, none is within it, or
-/// there are so many that any number is whole.
+/// The nearest whole number of counts; `None` where the rounding leaves open which it is, none is within it,
+/// or there are so many that any number is whole.
 fn nearest_count(counts: f64, rounded: f64) -> Option<f64> {
     let nearest = counts.round();
     let is_within = (counts - nearest).abs() <= rounded + COUNT_TOLERANCE;
