@@ -46,11 +46,7 @@ pub(crate) fn calibrated(folder: &Path, truth_m: [f64; 3]) -> Calibrated {
 fn of_robot(change: Change, seed: u64) -> Calibrated {
     let mut robot = PlainRobot::ordinary(seed);
     change(&mut robot);
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    if let Some(kept) = std::env::var_os("YAIR_OUT") {
-        robot.write(&Path::new(&kept).join(seed.to_string()));
-    }
-    let truth_m = robot.write(folder.path());
+    let (folder, truth_m) = robot.written();
     calibrated(folder.path(), truth_m)
 }
 
@@ -114,8 +110,7 @@ fn a_clock_of_another_rate_is_refused_with_what_mends_it() {
     ] {
         let mut robot = PlainRobot::ordinary(600);
         change(&mut robot);
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let truth_m = robot.write(folder.path());
+        let (folder, truth_m) = robot.written();
         let found = calibrated(folder.path(), truth_m);
         assert!(found.is_refused && found.said.contains("clock_drift"), "{}", found.said);
         // As it says, to five digits.
@@ -138,8 +133,7 @@ fn rows_that_are_sent_some_at_a_time_are_calibrated_once_they_are_corrected_as_c
     for seed in [971, 978, 979] {
         let mut robot = PlainRobot::ordinary(seed);
         robot.rows_per_packet = 5;
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let truth_m = robot.write(folder.path());
+        let (folder, truth_m) = robot.written();
         let mut command = Command::new(env!("CARGO_BIN_EXE_yair"));
         let checked = command.args(["check", "--json"]).arg(folder.path()).output().expect("it runs");
         let document: Value = serde_json::from_slice(&checked.stdout).expect("a document");

@@ -187,8 +187,8 @@ fn regress_a_large_kick_of_a_castor_is_no_robot_that_was_pushed() {
 }
 
 /// A castor's drag of sizes that cannot be explains more: lost counts were taken in spite of it, and dropped
-/// again as they explained too little beside it, so that nothing was found. So it was in case 29 of seed 44044,
-/// where a fit does not confirm lost counts any more since rates go by more rows.
+/// again as they explained too little beside it, so that nothing was found. So it was in case 29 of seed
+/// 44044, where a fit does not confirm lost counts any more since rates go by more rows.
 #[test]
 fn regress_what_is_found_in_spite_of_what_cannot_be_stays() {
     assert_eq!(first_cause(Scope::Whole, 55_055, 833, "missed_counts").as_deref(), Some("missed_counts"));

@@ -6,14 +6,13 @@
 //! --nocapture`.
 #![allow(clippy::print_stdout)] // every case with its seed
 
-use std::path::Path;
-
-use diagnose::{Document, Finding, Options, diagnose};
+use diagnose::{Document, Finding};
 use rayon::prelude::*;
 use statrs::distribution::{Binomial, DiscreteCDF};
 
 use crate::calibrated_ordinary_logs::calibrated;
 use crate::ordinary_kinds::robots;
+use crate::ordinary_logs::{diagnosed_in, shown_or_error};
 use crate::plain_robot::{Draws, Event, PlainRobot, Records, Reports, Stamps};
 
 /// A robot, what is not ordinary about its log, and the names that are right because of it.
@@ -33,8 +32,13 @@ impl Chance {
         self.0.uniform() < probability
     }
 
+    /// A whole number from 0 on, below another.
+    fn below(&mut self, end: usize) -> usize {
+        (self.0.uniform() * end as f64) as usize
+    }
+
     fn one_of<T: Copy>(&mut self, all: &[T]) -> T {
-        all[(self.0.uniform() * all.len() as f64) as usize]
+        all[self.below(all.len())]
     }
 
     /// Evenly over the logarithms.
@@ -95,7 +99,7 @@ impl Mixed {
     fn draw_rows(&mut self, chance: &mut Chance) {
         self.robot.ticks_per_rev = chance.between(120.0, 40_000.0).round();
         self.robot.odometry_hz = chance.one_of(&[10.0, 20.0, 25.0, 50.0, 50.0, 100.0, 100.0, 200.0]);
-        self.robot.records = match (chance.0.uniform() * 10.0) as usize {
+        self.robot.records = match chance.below(10) {
             0..=4 => Records::Counts,
             5 => Records::Angles { step_rad: chance.one_of(&[0.0, 1e-4, 1e-3]) },
             6 | 7 => Records::Speeds { step_m_s: chance.one_of(&[0.0, 1e-4, 1e-3]) },
@@ -104,7 +108,7 @@ impl Mixed {
                 Records::Twists { step_m_s: step, step_rad_s: step }
             }
         };
-        self.robot.stamps = match (chance.0.uniform() * 10.0) as usize {
+        self.robot.stamps = match chance.below(10) {
             0..=4 => Stamps::Exact,
             5 => Stamps::Jitter(chance.between(2e-4, 5e-3)),
             6 => Stamps::Received(chance.between(1e-3, 1e-2)),
@@ -139,7 +143,7 @@ impl Mixed {
         robot.truth_sigma_rad = robot.truth_sigma_m * chance.between(0.5, 3.0);
         robot.truth_between_rows = if chance.of(0.5) { chance.0.uniform() } else { 0.0 };
         robot.wraps = chance.of(0.5);
-        robot.reports = match (chance.0.uniform() * 10.0) as usize {
+        robot.reports = match chance.below(10) {
             0 => Reports::FirstAndLast,
             1 | 2 => Reports::Positions,
             _ => Reports::Poses,
@@ -185,7 +189,7 @@ impl Mixed {
 
     fn draw_fault(&mut self, chance: &mut Chance) {
         let sign = if chance.of(0.5) { 1.0 } else { -1.0 };
-        let (fault, said) = match (chance.0.uniform() * 9.0) as usize {
+        let (fault, said) = match chance.below(9) {
             0 => {
                 self.robot.eccentricity = chance.between(1e-3, 1e-2);
                 ("wheel_eccentricity", self.robot.eccentricity)
@@ -203,7 +207,7 @@ impl Mixed {
                 ("turn_rate_wheelbase", self.robot.base_grows_s)
             }
             4 => {
-                self.robot.right_late_s = (chance.between(1.0, 5.0)).round() * 1e-3;
+                self.robot.right_late_s = chance.between(1.0, 5.0).round() * 1e-3;
                 ("sampling_skew", self.robot.right_late_s)
             }
             5 => {
@@ -266,22 +270,10 @@ impl Mixed {
 /// geometry where nothing is wrong, and a line of all.
 fn of_seed(seed: u64) -> (Verdict, bool, Vec<f64>, String) {
     let drawn = Mixed::drawn(seed);
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let truth_m = drawn.robot.write(folder.path());
-    if let Some(kept) = std::env::var_os("YAIR_OUT") {
-        drawn.robot.write(&Path::new(&kept).join(seed.to_string()));
-    }
-    let dataset = dataset::read(folder.path()).expect("a dataset").dataset;
-    let found = diagnose(std::slice::from_ref(&dataset), &Options::default());
-    let found = found.map(|found| found.document).map_err(|error| error.to_string());
+    let (folder, truth_m) = drawn.robot.written();
+    let found = diagnosed_in(folder.path());
     let verdict = drawn.judged(&found);
-    let shown = match &found {
-        Ok(document) => {
-            let of = |finding: &Finding| format!("{} z {:.1}", finding.names.join("|"), finding.z);
-            document.findings.iter().map(of).collect::<Vec<_>>().join("; ")
-        }
-        Err(error) => error.clone(),
-    };
+    let shown = shown_or_error(&found).join("; ");
     let lengths = calibrated(folder.path(), truth_m);
     let z: Vec<String> = lengths.z.iter().map(|z| format!("{z:+.1}")).collect();
     let line = format!(

@@ -5,6 +5,8 @@
 //! campaign: `YAIR_ROBOTS=40 cargo test --release --test diagnosis ordinary_logs -- --nocapture`.
 #![allow(clippy::print_stdout)] // every case with its seed
 
+use std::path::Path;
+
 use diagnose::{Document, Finding, Options, diagnose};
 use rayon::prelude::*;
 use statrs::distribution::{Binomial, DiscreteCDF};
@@ -13,9 +15,12 @@ use crate::ordinary_kinds::{Change, kinds, robots};
 use crate::plain_robot::{Event, PlainRobot, Records, Reports};
 
 fn diagnosed(robot: &PlainRobot) -> Result<Document, String> {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    robot.write(folder.path());
-    let dataset = dataset::read(folder.path()).expect("a dataset").dataset;
+    diagnosed_in(robot.written().0.path())
+}
+
+/// The diagnosis of the dataset in a folder.
+pub(crate) fn diagnosed_in(folder: &Path) -> Result<Document, String> {
+    let dataset = dataset::read(folder).expect("a dataset").dataset;
     let found = diagnose(std::slice::from_ref(&dataset), &Options::default());
     found.map(|found| found.document).map_err(|error| error.to_string())
 }
@@ -40,7 +45,7 @@ fn complaint_of(log: &str, is_right: bool, shown: &[String]) -> Option<String> {
 }
 
 /// What is shown of a diagnosis, or why there is none.
-fn shown_or_error(found: &Result<Document, String>) -> Vec<String> {
+pub(crate) fn shown_or_error(found: &Result<Document, String>) -> Vec<String> {
     found.as_ref().map_or_else(|error| vec![error.clone()], shown)
 }
 

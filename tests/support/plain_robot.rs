@@ -264,6 +264,17 @@ impl PlainRobot {
         }
     }
 
+    /// The dataset in a temporary folder, and what [`Self::write`] says of the robot; where YAIR_OUT is set, the
+    /// dataset stays in a folder there.
+    pub(crate) fn written(&self) -> (tempfile::TempDir, [f64; 3]) {
+        if let Some(kept) = std::env::var_os("YAIR_OUT") {
+            self.write(&Path::new(&kept).join(self.seed.to_string()));
+        }
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let truth_m = self.write(folder.path());
+        (folder, truth_m)
+    }
+
     /// Drives all runs and writes the dataset; the diameters of the wheels, and their separation, metres.
     pub(crate) fn write(&self, folder: &Path) -> [f64; 3] {
         fs::create_dir_all(folder).expect("a folder");

@@ -35,19 +35,22 @@ pub(crate) fn restore(runs: &mut [Run], robot: &NominalRobot) {
 
 /// What a run may be made of.
 trait Counted {
-    /// By row; `None` where it is no whole number.
-    fn counts(&self) -> &[Option<Wheels<f64>>];
-
-    /// Counts that it is rounded by at the most.
-    fn rounded(&self) -> f64;
+    fn counts(&self) -> &Counts;
 
     fn apply(&self, run: &mut Run);
 }
 
+/// Counts that something may be made of.
+struct Counts {
+    /// By row; `None` where it is no whole number.
+    by_row: Vec<Option<Wheels<f64>>>,
+    /// Counts that it is rounded by at the most.
+    rounded: f64,
+}
+
 /// The counts that the angles of a run may be made of, since the first row.
 struct CountedAngles {
-    counts: Vec<Option<Wheels<f64>>>,
-    rounded: f64,
+    counts: Counts,
     /// Of the first row.
     first: Wheels<f64>,
 }
@@ -61,25 +64,21 @@ impl CountedAngles {
         let first = Wheels { left: *angles.left.first()?, right: *angles.right.first()? };
         let of_row = |(left, right): (&f64, &f64)| {
             let since_first = Wheels { left: left - first.left, right: right - first.right };
-            let nearest = since_first.map(|rad| nearest_count(rad / rad_per_count, rounded));
-            Some(Wheels { left: nearest.left?, right: nearest.right? })
+            of_both(since_first.map(|rad| nearest_count(rad / rad_per_count, rounded)))
         };
-        let counts = angles.left.iter().zip(&angles.right).map(of_row).collect();
-        Some(Self { counts, rounded, first: first.map(|rad| (rad / rad_per_count).round()) })
+        let by_row = angles.left.iter().zip(&angles.right).map(of_row).collect();
+        let first = first.map(|rad| (rad / rad_per_count).round());
+        Some(Self { counts: Counts { by_row, rounded }, first })
     }
 }
 
 impl Counted for CountedAngles {
-    fn counts(&self) -> &[Option<Wheels<f64>>] {
+    fn counts(&self) -> &Counts {
         &self.counts
     }
 
-    fn rounded(&self) -> f64 {
-        self.rounded
-    }
-
     fn apply(&self, run: &mut Run) {
-        let Some(counts) = self.counts.iter().copied().collect::<Option<Vec<Wheels<f64>>>>() else { return };
+        let Some(counts) = self.counts.by_row.iter().copied().collect::<Option<Vec<Wheels<f64>>>>() else { return };
         let column = |side: Side| counts.iter().map(|of| (self.first[side] + of[side]) as i64).collect();
         run.odometry.wheels = WheelLog::Ticks(Wheels::from_sides(column));
     }
@@ -87,24 +86,27 @@ impl Counted for CountedAngles {
 
 /// The counts that the rates of a run may be made of.
 struct CountedRates {
-    /// By row; `None` where a rate is none of whole numbers.
-    counts: Vec<Option<Wheels<f64>>>,
-    /// In which they came, seconds.
+    counts: Counts,
+    /// In which they came, by row, seconds.
     row_s: Vec<f64>,
-    /// Counts that rates are rounded by at the most.
-    rounded: f64,
     /// Are rows missing?
     is_missing: bool,
     m_per_count: Wheels<f64>,
-    separation_m: f64,
+    geometry: DriveGeometry,
 }
 
 impl CountedRates {
     fn of(run: &Run, robot: &NominalRobot, has_even_rows: bool) -> Option<Self> {
         let ticks_per_rev = robot.ticks_per_rev?;
         let geometry = robot.geometry().ok()?;
-        let step = run.odometry.wheels.recorded_step().unwrap_or(0.0);
-        let (speeds_m_s, rounded_m_s) = wheel_speeds_m_s(&run.odometry.wheels, &geometry, step)?;
+        let wheels = &run.odometry.wheels;
+        // A twist has the rounding of both of its rates in each wheel.
+        let wheel_share = match wheels {
+            WheelLog::Speeds(_) => 1.0,
+            WheelLog::Twist { .. } => 1.0 + 0.5 * geometry.wheel_separation_m(),
+            WheelLog::Ticks(_) | WheelLog::Angles(_) => return None,
+        };
+        let rounded_m_s = 0.5 * wheel_share * wheels.recorded_step().unwrap_or(0.0);
         let m_per_count = geometry.m_per_rad().map(|m_per_rad| m_per_rad * TAU / ticks_per_rev);
         let t_s = &run.odometry.t_s;
         let since_s: Vec<f64> = t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -115,19 +117,20 @@ impl CountedRates {
         } else {
             [usual_s].into_iter().chain(since_s).collect()
         };
-        let of_row = |(speed_m_s, row_s): (&Wheels<f64>, &f64)| {
-            let nearest = speed_m_s.zip_with(m_per_count, |speed_m_s, m_per_count| {
+        let of_row = |(row, row_s): (usize, &f64)| {
+            let speed_m_s = wheels.reported_speed_m_s(&geometry, row)?;
+            of_both(speed_m_s.zip_with(m_per_count, |speed_m_s, m_per_count| {
                 nearest_count(speed_m_s * row_s / m_per_count, rounded_m_s * row_s / m_per_count)
-            });
-            Some(Wheels { left: nearest.left?, right: nearest.right? })
+            }))
         };
+        let by_row = row_s.iter().enumerate().map(of_row).collect();
+        let rounded = rounded_m_s * usual_s / m_per_count.left.min(m_per_count.right);
         Some(Self {
-            counts: speeds_m_s.iter().zip(&row_s).map(of_row).collect(),
-            rounded: rounded_m_s * usual_s / m_per_count.left.min(m_per_count.right),
+            counts: Counts { by_row, rounded },
             row_s,
             is_missing: period.is_some_and(|period| period.numbers.windows(2).any(|pair| pair[1] - pair[0] != 1)),
             m_per_count,
-            separation_m: geometry.wheel_separation_m(),
+            geometry,
         })
     }
 
@@ -138,33 +141,30 @@ impl CountedRates {
             count += of.map_or(0, |of| of[side] as i64);
             count
         };
-        let since_first: Vec<i64> = self.counts.iter().skip(1).map(next).collect();
+        let since_first: Vec<i64> = self.counts.by_row.iter().skip(1).map(next).collect();
         [0].into_iter().chain(since_first).collect()
     }
 }
 
 impl Counted for CountedRates {
-    fn counts(&self) -> &[Option<Wheels<f64>>] {
+    fn counts(&self) -> &Counts {
         &self.counts
     }
 
-    fn rounded(&self) -> f64 {
-        self.rounded
-    }
-
     fn apply(&self, run: &mut Run) {
-        if !self.is_missing && self.counts.iter().skip(1).all(Option::is_some) {
+        let by_row = &self.counts.by_row;
+        if !self.is_missing && by_row.iter().skip(1).all(Option::is_some) {
             run.odometry.wheels = WheelLog::Ticks(Wheels::from_sides(|side| self.counter(side)));
             return;
         }
-        for (row, (of, row_s)) in self.counts.iter().zip(&self.row_s).enumerate() {
+        for (row, (of, row_s)) in by_row.iter().zip(&self.row_s).enumerate() {
             let Some(counts) = of else { continue };
             let speed_m_s = counts.zip_with(self.m_per_count, |count, m_per_count| count * m_per_count / row_s);
             match &mut run.odometry.wheels {
                 WheelLog::Speeds(speeds) => (speeds.left[row], speeds.right[row]) = (speed_m_s.left, speed_m_s.right),
                 WheelLog::Twist { v_mps, omega_radps } => {
-                    v_mps[row] = 0.5 * (speed_m_s.left + speed_m_s.right);
-                    omega_radps[row] = (speed_m_s.right - speed_m_s.left) / self.separation_m;
+                    let Twist { v_m_s, omega_rad_s } = self.geometry.twist(speed_m_s);
+                    (v_mps[row], omega_radps[row]) = (v_m_s, omega_rad_s);
                 }
                 WheelLog::Ticks(_) | WheelLog::Angles(_) => {}
             }
@@ -172,21 +172,9 @@ impl Counted for CountedRates {
     }
 }
 
-/// Speeds of the wheels at the floor by row, and what the rounding to a step makes them wrong by at the most,
-/// m/s; `None` of counts and angles.
-fn wheel_speeds_m_s(wheels: &WheelLog, geometry: &DriveGeometry, step: f64) -> Option<(Vec<Wheels<f64>>, f64)> {
-    match wheels {
-        WheelLog::Speeds(speeds) => {
-            let rows = speeds.left.iter().zip(&speeds.right);
-            Some((rows.map(|(&left, &right)| Wheels { left, right }).collect(), 0.5 * step))
-        }
-        WheelLog::Twist { v_mps, omega_radps } => {
-            let rows = v_mps.iter().zip(omega_radps);
-            let speeds = rows.map(|(&v_m_s, &omega_rad_s)| geometry.wheel_speed_m_s(Twist { v_m_s, omega_rad_s }));
-            Some((speeds.collect(), 0.5 * step * (1.0 + 0.5 * geometry.wheel_separation_m())))
-        }
-        WheelLog::Ticks(_) | WheelLog::Angles(_) => None,
-    }
+/// The counts of both wheels, where both are whole.
+fn of_both(counts: Wheels<Option<f64>>) -> Option<Wheels<f64>> {
+    Some(Wheels { left: counts.left?, right: counts.right? })
 }
 
 /// The nearest whole number of counts; `None` where the rounding leaves open which it is, none is within it,
@@ -201,11 +189,11 @@ fn nearest_count(counts: f64, rounded: f64) -> Option<f64> {
 /// What is not made of counts is within the rounding of one with twice that probability, and a robot that
 /// drives evenly says the same again and again.
 fn are_counted(runs: &[&impl Counted]) -> bool {
-    let moving = || runs.iter().flat_map(|run| run.counts()).filter(|of| **of != Some(Wheels::both(0.0)));
+    let moving = || runs.iter().flat_map(|run| &run.counts().by_row).filter(|of| **of != Some(Wheels::both(0.0)));
     let counted: Vec<&Wheels<f64>> = moving().flatten().collect();
     let numbers: BTreeSet<(Side, i64)> =
         counted.iter().flat_map(|of| Side::BOTH.map(|side| (side, of[side] as i64))).collect();
-    let rounded = runs.iter().map(|run| run.rounded()).fold(0.0, f64::max);
+    let rounded = runs.iter().map(|run| run.counts().rounded).fold(0.0, f64::max);
     let log_chance = numbers.len() as f64 * (2.0 * (rounded + COUNT_TOLERANCE)).ln();
     log_chance <= MAX_CHANCE_OF_COUNTS.ln() && counted.len() as f64 >= MIN_COUNTED_SHARE * moving().count() as f64
 }
@@ -258,11 +246,11 @@ mod tests {
 
     fn largest_error(run: &Run, exact: &Wheels<Vec<f64>>) -> f64 {
         let geometry = ROBOT.geometry().expect("a robot");
-        let (speeds, _) = wheel_speeds_m_s(&run.odometry.wheels, &geometry, 1e-3).expect("speeds");
-        let off = |(row, of): (usize, &Wheels<f64>)| {
+        let off = |row: usize| {
+            let of = run.odometry.wheels.reported_speed_m_s(&geometry, row).expect("speeds");
             f64::max((of.left - exact.left[row]).abs(), (of.right - exact.right[row]).abs())
         };
-        speeds.iter().enumerate().map(off).fold(0.0, f64::max)
+        (0..run.odometry.t_s.len()).map(off).fold(0.0, f64::max)
     }
 
     #[test]

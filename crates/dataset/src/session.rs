@@ -2,7 +2,8 @@
 //! nothing.
 
 use kinematics::{
-    Branching, Count, Elementary, Frame, Odometry as DeadReckoner, Point, Pose, Rule, Wheels, unwrap_near,
+    Branching, Count, DriveGeometry, Elementary, Frame, Odometry as DeadReckoner, Point, Pose, Rule, Twist, Wheels,
+    unwrap_near,
 };
 
 use crate::record::{Dataset, MarkedPoint, NominalRobot, Odometry, Run, RunInfo, TruthNoise, WheelLog};
@@ -53,6 +54,20 @@ impl Dataset {
 pub struct RunView<'a> {
     run: &'a Run,
     points: &'a [MarkedPoint],
+}
+
+impl WheelLog {
+    /// As [`RunView::reported_speed_m_s`], by a geometry.
+    pub(crate) fn reported_speed_m_s(&self, geometry: &DriveGeometry, row: usize) -> Option<Wheels<f64>> {
+        match self {
+            Self::Speeds(speeds) => Some(Wheels { left: *speeds.left.get(row)?, right: *speeds.right.get(row)? }),
+            Self::Twist { v_mps, omega_radps } => {
+                let twist = Twist { v_m_s: *v_mps.get(row)?, omega_rad_s: *omega_radps.get(row)? };
+                Some(geometry.wheel_speed_m_s(twist))
+            }
+            Self::Ticks(_) | Self::Angles(_) => None,
+        }
+    }
 }
 
 impl<'a> RunView<'a> {
@@ -130,14 +145,7 @@ impl<'a> RunView<'a> {
     /// The contact speeds that a row reports, m/s, for a robot that reports speeds or its twist.
     #[must_use]
     pub fn reported_speed_m_s(&self, robot: &NominalRobot, row: usize) -> Option<Wheels<f64>> {
-        match &self.run.odometry.wheels {
-            WheelLog::Speeds(speeds) => Some(Wheels { left: *speeds.left.get(row)?, right: *speeds.right.get(row)? }),
-            WheelLog::Twist { v_mps, omega_radps } => {
-                let twist = kinematics::Twist { v_m_s: *v_mps.get(row)?, omega_rad_s: *omega_radps.get(row)? };
-                Some(robot.geometry().ok()?.wheel_speed_m_s(twist))
-            }
-            WheelLog::Ticks(_) | WheelLog::Angles(_) => None,
-        }
+        self.run.odometry.wheels.reported_speed_m_s(&robot.geometry().ok()?, row)
     }
 
     /// Wheel angles at the rows by the nominal geometry, radians since the first, of a robot that reports
@@ -181,7 +189,7 @@ impl<'a> RunView<'a> {
     pub fn dead_reckon(
         &self,
         robot: &NominalRobot,
-        geometry: &kinematics::DriveGeometry,
+        geometry: &DriveGeometry,
         rule: Rule,
         start: Pose,
         mut visit: impl FnMut(f64, Pose),

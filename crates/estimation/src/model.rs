@@ -135,6 +135,13 @@ pub struct Model {
 }
 
 impl Model {
+    /// The values of the terms up to the last that has one: terms that are only tested are many, and have the
+    /// value zero.
+    pub(crate) fn sized_terms(&self) -> &[f64] {
+        let sized = self.term_values.iter().rposition(|size| *size != 0.0).map_or(0, |last| last + 1);
+        &self.term_values[..sized]
+    }
+
     /// A drive whose instrument is at its centre and without latency, with further terms at zero.
     #[must_use]
     pub fn of(geometry: &DriveGeometry, term_parameters: usize) -> Self {

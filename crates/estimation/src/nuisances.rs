@@ -162,13 +162,14 @@ pub(crate) fn explained_by_nuisances<'a>(
     if thin {
         plain.thin()?;
     }
-    let outliers = |found: &ModelFit<'_>| found.solution.pass.outliers.len();
-    let uses_more = plain.thinning != Thinning::NONE || MIN_OUTLIER_REDUCTION * outliers(&explained) < outliers(&plain);
+    let has_fewer_outliers = |found: &ModelFit<'_>, plain: &ModelFit<'_>| {
+        MIN_OUTLIER_REDUCTION * found.solution.pass.outliers.len() < plain.solution.pass.outliers.len()
+    };
     let is_better = if thin && explained.is_to_be_thinned() {
         explained.thin()?;
-        MIN_OUTLIER_REDUCTION * outliers(&explained) < outliers(&plain)
+        has_fewer_outliers(&explained, &plain)
     } else {
-        uses_more
+        plain.thinning != Thinning::NONE || has_fewer_outliers(&explained, &plain)
     };
     Ok(if is_better { Explained::Yes(explained) } else { Explained::No { thinned: plain } })
 }

@@ -259,28 +259,22 @@ impl<'f, 'a> Propagator<'f, 'a> {
 
     /// Where a term is of the body elsewhere, the point that is seen on the body turns with it.
     fn turn_levers(&mut self) {
-        let values = &self.model.term_values;
-        let value = |column: usize| values.get(column).copied().unwrap_or(0.0);
-        let mut lever_m = [self.model.body_from_sensor.x_m, self.model.body_from_sensor.y_m];
-        let mut at = 0;
-        for term in self.terms.iter() {
-            let own = at..at + term.parameters().len();
-            at = own.end;
-            for column in own.filter(|column| value(*column) != 0.0 && !term.moves_body()) {
-                lever_m[0] += value(column) * self.gradients[column].x_m;
-                lever_m[1] += value(column) * self.gradients[column].y_m;
+        let Model { body_from_sensor, term_values, .. } = self.model;
+        let sized = self.model.sized_terms().len();
+        let (mut ahead_m, mut left_m) = (body_from_sensor.x_m, body_from_sensor.y_m);
+        for (term, own) in with_columns(self.terms).take_while(|(_, own)| own.start < sized) {
+            for column in own.filter(|column| *column < sized && !term.moves_body()) {
+                ahead_m += term_values[column] * self.gradients[column].x_m;
+                left_m += term_values[column] * self.gradients[column].y_m;
             }
         }
-        if lever_m == [0.0; 2] {
+        if (ahead_m, left_m) == (0.0, 0.0) {
             return;
         }
-        let [ahead_m, left_m] = lever_m;
-        let mut at = 0;
-        for term in self.terms.iter() {
-            let own = at..at + term.parameters().len();
-            at = own.end;
-            for column in own.filter(|_| term.moves_body()) {
-                let (gradient, value) = (&mut self.gradients[column], value(column));
+        for (_, own) in with_columns(self.terms).filter(|(term, _)| term.moves_body()) {
+            for column in own {
+                let gradient = &mut self.gradients[column];
+                let value = term_values.get(column).copied().unwrap_or(0.0);
                 let (turned, shrunk) = if value == 0.0 {
                     (gradient.theta_rad, 0.0)
                 } else {
@@ -345,8 +339,7 @@ impl<'f, 'a> Propagator<'f, 'a> {
         let mut moved = Moved { motion: Pose::IDENTITY, by_geometry: [Vector3::zeros(); 3] };
         self.propagation_by_terms.clear();
         let run_from_start = Frame::from(self.run_from_chain * pose);
-        // Terms that are only tested are many, and have the value zero.
-        let sized = self.model.term_values.iter().rposition(|size| *size != 0.0).map_or(0, |last| last + 1);
+        let sized = self.model.sized_terms();
         for interval in &self.segment.intervals[propagation.intervals.clone()] {
             let travel_m = m_per_rad.zip_with(interval.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
             let of_counts = Increment::from_travel(travel_m, separation_m);
@@ -354,7 +347,7 @@ impl<'f, 'a> Propagator<'f, 'a> {
             let mut of_terms = Pose::IDENTITY;
             if !self.gradients.is_empty() {
                 self.term_gradients(interval, travel_m, run_from_start * before);
-                for (gradient, size) in self.gradients.iter().zip(&self.model.term_values[..sized]) {
+                for (gradient, size) in self.gradients.iter().zip(sized) {
                     of_terms.x_m += size * gradient.x_m;
                     of_terms.y_m += size * gradient.y_m;
                     of_terms.theta_rad += size * gradient.theta_rad;
@@ -484,6 +477,15 @@ impl<'f, 'a> Propagator<'f, 'a> {
         };
         self.ask_terms(|term, own| term.motion(&interval, own));
     }
+}
+
+/// Terms, each with its columns of the gradients.
+fn with_columns(terms: &[Box<dyn ModelTerm>]) -> impl Iterator<Item = (&dyn ModelTerm, Range<usize>)> {
+    terms.iter().scan(0, |end, term| {
+        let start = *end;
+        *end += term.parameters().len();
+        Some((&**term, start..*end))
+    })
 }
 
 /// A derivative carried over a step: a heading error turns the motion after it.

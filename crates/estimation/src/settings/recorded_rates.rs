@@ -5,6 +5,6 @@
 pub(crate) const MAX_SHARED_RATES: usize = 96;
 
 /// Steps of a recorded rate that one count of a wheel makes, from which on the noise of counts dithers
-/// nothing. Derived: an interval of rounding then has two numbers of counts at the most, and errors of their
-/// own.
+/// nothing.
+/// Derived: an interval of rounding then has two numbers of counts at the most, and errors of their own.
 pub(crate) const MIN_COUNT_STEPS: f64 = 0.5;

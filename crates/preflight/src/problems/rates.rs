@@ -31,24 +31,28 @@ pub(crate) fn found(check: &mut SessionCheck, dataset: &Dataset) {
     let (windows, measured) = windows(&check.runs, matched.reading, MAX_WINDOWS);
     let comparison = |runs| Comparison { windows: &windows, measured, runs, m_per_rad: check.m_per_rad() };
     let (interval, instant) = (comparison(&check.runs), comparison(&of_instant));
-    let (Some(now), Some(then)) = (interval.at(matched.clock), instant.at(Clock::default())) else { return };
+    let (Some(as_stamped), Some(then)) = (interval.at(Clock::default()), instant.at(Clock::default())) else { return };
+    let gain = then.gain_over(&as_stamped);
     let as_well = matched.clock != Clock::default();
-    if !as_well && then.gain_over(&now) <= MIN_GAIN {
+    if !as_well && gain <= MIN_GAIN {
         return;
     }
     // Rates of the instant, taken for those of the interval, make poses late by half a row and no more. Poses
     // that are late by something else gain by that half too; and the mean of two rows is less noisy where
     // stamps or rates are.
     let Some(delayed) = interval.best_offset(false) else { return };
-    let Some(as_stamped) = interval.at(Clock::default()) else { return };
     let half_row_s = 0.5 * mean_interval_s(&check.runs);
     let gained = delayed.explained.gain_over(&as_stamped);
     let is_half_row = (delayed.clock.offset_s - half_row_s).abs() < HALF_ROW_SHARE * half_row_s + 2.0 * delayed.sigma_s;
     let is_as_good = delayed.explained.gain_over(&then) < DELAY_GAIN_SHARE * gained;
     if is_half_row && is_as_good && gained > MIN_GAIN {
-        let gain = then.gain_over(&now).max(MIN_GAIN);
         check.problems.retain(|problem| !as_well || problem.severity != Severity::Hint || problem.fix.is_none());
-        check.problems.push(Problem::new(&Kind::InstantRates, Severity::Warning, None, probability(gain)));
+        check.problems.push(Problem::new(
+            &Kind::InstantRates,
+            Severity::Warning,
+            None,
+            probability(gain.max(MIN_GAIN)),
+        ));
     }
 }
 
