@@ -264,8 +264,8 @@ impl PlainRobot {
         }
     }
 
-    /// The dataset in a temporary folder, and what [`Self::write`] says of the robot; where YAIR_OUT is set, the
-    /// dataset stays in a folder there.
+    /// The dataset in a temporary folder, and what [`Self::write`] says of the robot; where YAIR_OUT is set,
+    /// the dataset stays in a folder there.
     pub(crate) fn written(&self) -> (tempfile::TempDir, [f64; 3]) {
         if let Some(kept) = std::env::var_os("YAIR_OUT") {
             self.write(&Path::new(&kept).join(self.seed.to_string()));
