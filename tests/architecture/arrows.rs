@@ -191,10 +191,11 @@ fn the_arrows_reject_an_estimator_that_links_the_truth_and_a_room_that_nobody_kn
     assert!(unknown.len() == 1 && unknown[0].contains("add it to ARROWS"), "{unknown:?}");
 }
 
-/// Packages with their features as Cargo builds them for some arguments.
+/// Packages with their features as Cargo builds them for some arguments. Cargo may download: it asks for
+/// packages of other machines too, which the build of this one did not fetch.
 fn packages_with_features(arguments: &[&str]) -> BTreeSet<String> {
     let output = Command::new(env!("CARGO"))
-        .args(["tree", "--offline", "--prefix", "none", "--no-dedupe", "-f", "{p} [{f}]"])
+        .args(["tree", "--locked", "--prefix", "none", "--no-dedupe", "-f", "{p} [{f}]"])
         .args(arguments)
         .current_dir(root())
         .output()
