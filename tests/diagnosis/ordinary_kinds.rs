@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use crate::plain_robot::{PlainRobot, Records, Reports, Stamps};
+use crate::plain_robot::{Event, PlainRobot, Records, Reports, Stamps};
 
 /// Robots of each kind, and the first seed.
 pub(crate) fn robots() -> (u64, u64) {
@@ -327,7 +327,53 @@ const KINDS: &[(&str, Change, &[&str])] = &[
         |of| (of.reports, of.truth_sigma_m, of.truth_hz) = (Reports::Positions, 5e-3, 1.0),
         &[],
     ),
+    (
+        "positions of a marker 5 cm ahead",
+        |of| {
+            of.reports = Reports::Positions;
+            mount(of, [0.05, 0.0, 0.0]);
+        },
+        &["truth_lever_arm"],
+    ),
+    (
+        "positions of a marker 15 cm behind and 10 cm to the left",
+        |of| {
+            of.reports = Reports::Positions;
+            mount(of, [-0.15, 0.1, 0.0]);
+        },
+        &["truth_lever_arm"],
+    ),
+    (
+        "positions of 15 mm at 5 Hz, of an antenna 30 cm ahead",
+        |of| {
+            (of.reports, of.truth_sigma_m, of.truth_hz) = (Reports::Positions, 1.5e-2, 5.0);
+            mount(of, [0.3, 0.0, 0.0]);
+        },
+        &["truth_lever_arm"],
+    ),
+    (
+        "positions of 15 mm at 5 Hz, of an antenna 30 cm ahead, eight drives",
+        |of| {
+            (of.reports, of.truth_sigma_m, of.truth_hz) = (Reports::Positions, 1.5e-2, 5.0);
+            (of.only, of.runs) = (Some("free"), 8);
+            mount(of, [0.3, 0.0, 0.0]);
+        },
+        &["truth_lever_arm"],
+    ),
+    (
+        "positions of a marker 15 cm behind, one long log",
+        |of| {
+            (of.reports, of.joined) = (Reports::Positions, true);
+            mount(of, [-0.15, 0.0, 0.0]);
+        },
+        &["truth_lever_arm"],
+    ),
 ];
+
+/// The marker stands at this place of the robot in every run, metres and radians.
+fn mount(robot: &mut PlainRobot, at: [f64; 3]) {
+    robot.events = (0..21).map(|run| (run, Event::OtherMarker { at })).collect();
+}
 
 /// Kinds that are asked where YAIR_ROBOTS or YAIR_KIND is set alone: others are like them.
 const IN_CAMPAIGNS: [&str; 3] = ["rippled", "cm/s", "two decimals"];

@@ -20,6 +20,7 @@ impl MethodReport {
                     &[Parameter::RightWheelDiameter, Parameter::RightPerTick]
                 }
                 () if blind.parameter == Parameter::WheelSeparation.key() => &[Parameter::WheelSeparation],
+                () if blind.parameter == Parameter::SensorTheta.key() => &[Parameter::SensorTheta],
                 () => &[],
             };
             for parameter in keys {

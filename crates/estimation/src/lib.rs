@@ -63,6 +63,7 @@ mod resimulation;
 mod rounding;
 mod segment;
 mod segment_record;
+mod sensor_position;
 mod settings;
 mod stated_wheels;
 mod step_control;

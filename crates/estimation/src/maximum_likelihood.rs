@@ -57,6 +57,9 @@ impl FitSettings {
         let nominal = Model::of(&first.robot.geometry()?, 0);
         let mut found = ModelFit::before_any_step(sessions, nominal, ends, self.thin_displacements);
         found.free_extrinsics_if_rotated();
+        if self.nuisances {
+            found.free_extrinsics_if_elsewhere();
+        }
         found.refit(None, &mut [])?;
         found.fix_unobservable()?;
         let explained = if self.nuisances { explained_by_nuisances(&found, self.thin)? } else { Explained::NotTried };

@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use dataset::Session;
+use kinematics::Pose;
 use model_term::ModelTerm;
 use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen, Vector3};
 use rayon::prelude::*;
@@ -127,7 +128,15 @@ impl ModelFit<'_> {
         let heading_rad = self.records.sensor_heading_rad(&self.nominal);
         if heading_rad.abs() > ROTATED_SENSOR_RAD {
             self.start.body_from_sensor.theta_rad = heading_rad;
-            self.columns.extend(Column::EXTRINSICS);
+            self.columns.extend(self.records.extrinsics());
+        }
+    }
+
+    /// Frees the extrinsics of a sensor of positions that is not at the drive's centre.
+    pub(crate) fn free_extrinsics_if_elsewhere(&mut self) {
+        if let Some([x_m, y_m]) = self.records.sensor_position_m(&self.nominal) {
+            self.start.body_from_sensor = Pose::new(x_m, y_m, self.start.body_from_sensor.theta_rad);
+            self.columns.extend(self.records.extrinsics());
         }
     }
 

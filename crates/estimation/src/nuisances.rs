@@ -64,19 +64,15 @@ fn mean_and_error(values: &[f64]) -> Option<(f64, f64)> {
 /// keeps out terms that lower the cost and worsen the calibration. What each run has for itself is fitted to
 /// some blocks of it and judged on the others.
 pub(crate) fn add_nuisances(fit: &mut ModelFit<'_>, gate: OutlierGate) -> Result<(), EstimationError> {
-    let sets: [&[Column]; 3] = [
-        &Column::EXTRINSICS,
-        &[Column::Latency],
-        &[Column::SensorX, Column::SensorY, Column::SensorTheta, Column::Latency],
-    ];
-    let several = fit.solution.pass.runs.iter().any(|run| run.run.0 != fit.solution.pass.runs[0].run.0);
+    let sets = nuisance_sets(fit);
+    let runs = &fit.solution.pass.runs;
     let mut groupings = vec![None];
     // Autocorrelated errors are common to the blocks of a run, so that blocks are no held-out data for each
     // other.
-    if gate == OutlierGate::Off || (fit.thinning == Thinning::NONE && fit.is_white()) {
+    if runs.len() > 1 && (gate == OutlierGate::Off || (fit.thinning == Thinning::NONE && fit.is_white())) {
         groupings.push(Some(Grouping::Run));
     }
-    if several {
+    if runs.iter().any(|run| run.run.0 != runs[0].run.0) {
         groupings.push(Some(Grouping::Session));
     }
     let mut best: Option<AcceptedNuisances> = None;
@@ -85,11 +81,11 @@ pub(crate) fn add_nuisances(fit: &mut ModelFit<'_>, gate: OutlierGate) -> Result
         let Some(base) = held_out(fit, &units, &fit.columns, None) else { continue };
         // A larger set must gain over the smaller one as significantly as that over none.
         let mut of_grouping: Option<AcceptedNuisances> = None;
-        for set in sets {
+        for set in &sets {
             let others = || fit.columns.iter().filter(|column| !set.contains(column)).copied();
             let (columns, own): (Vec<Column>, _) = match grouping {
                 None => (others().chain(set.iter().copied()).collect(), None),
-                Some(grouping) => (others().collect(), Some(GroupExtrinsics::new(grouping, set.to_vec()))),
+                Some(grouping) => (others().collect(), Some(GroupExtrinsics::new(grouping, set.clone()))),
             };
             let Some(found) = held_out(fit, &units, &columns, own.as_ref()) else { continue };
             let before = of_grouping.as_ref().map_or(&base, |accepted| &accepted.held_out);
@@ -134,6 +130,19 @@ pub(crate) fn add_nuisances(fit: &mut ModelFit<'_>, gate: OutlierGate) -> Result
         }
     }
     Ok(())
+}
+
+/// The sets of the instrument's columns that are tried, each larger one after those in it.
+fn nuisance_sets(fit: &ModelFit<'_>) -> Vec<Vec<Column>> {
+    let extrinsics = fit.records.extrinsics().to_vec();
+    let latency = vec![Column::Latency];
+    // Without headings a position near the centre is no small step from the centre: a spin's start heading
+    // is any there (`sensor_position`).
+    if !extrinsics.contains(&Column::SensorTheta) && !fit.has(Column::SensorX) {
+        return vec![latency];
+    }
+    let all = [&extrinsics[..], &latency].concat();
+    vec![extrinsics, latency, all]
 }
 
 /// How many directions of the geometry the measurements of a fit do not determine.

@@ -446,32 +446,32 @@ fn block_diagonal(mean: &DMatrix<f64>, noise: &Matrix4<f64>) -> DMatrix<f64> {
     all
 }
 
-/// Approximate heading of a segment without measured headings at one of its measurements, radians: the
-/// rotation of its dead-reckoned path from there onto the measured one. 0 for other segments.
+/// Approximate heading of the instrument at one of the measurements of a segment without measured headings,
+/// radians: the rotation of its dead-reckoned path from there onto the measured one. 0 for other segments.
 pub(crate) fn start_heading(segment: &Segment<'_>, model: &Model, from: usize) -> f64 {
     let Some(first) = segment.measurements.get(from).filter(|_| segment.has_free_heading()) else {
         return 0.0;
     };
     let (mut pose, mut at) = (Pose::IDENTITY, first.after);
-    let (mut dot, mut cross, mut heading_rad, mut longest_m) = (0.0, 0.0, 0.0, 0.0_f64);
+    let body_from_sensor = model.instrument(segment.run).body_from_sensor;
+    let sensor_from_body = body_from_sensor.inverse();
+    let (mut dot, mut cross, mut longest_m) = (0.0, 0.0, 0.0_f64);
     for measurement in &segment.measurements[from + 1..] {
         for interval in &segment.intervals[at..measurement.after] {
             pose = pose * model.increment(interval.wheel_rad).arc();
         }
         at = measurement.after;
         let (x_m, y_m) = (measurement.x_m - first.x_m, measurement.y_m - first.y_m);
-        dot += pose.x_m * x_m + pose.y_m * y_m;
-        cross += pose.x_m * y_m - pose.y_m * x_m;
+        let moved = sensor_from_body * pose * body_from_sensor;
+        dot += moved.x_m * x_m + moved.y_m * y_m;
+        cross += moved.x_m * y_m - moved.y_m * x_m;
         longest_m = longest_m.max(x_m.hypot(y_m));
         // Dead reckoning is best near the start.
-        if longest_m > START_HEADING_BASELINE_M || heading_rad == 0.0 {
-            heading_rad = unwrap_near(cross.atan2(dot), 0.0);
-        }
         if longest_m > START_HEADING_BASELINE_M {
             break;
         }
     }
-    heading_rad
+    if dot == 0.0 && cross == 0.0 { 0.0 } else { unwrap_near(cross.atan2(dot), 0.0) }
 }
 
 #[cfg(test)]

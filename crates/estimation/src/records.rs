@@ -11,7 +11,7 @@ use dataset::{CovarianceScale, MapDistortion, Run, RunView, Session, TruthSample
 use kinematics::{Increment, Pose};
 use rayon::prelude::*;
 
-use crate::model::Model;
+use crate::model::{Column, Model};
 use crate::noise::NoisePrior;
 use crate::noise_shape::NoiseShape;
 use crate::partial_records::{GyroSettings, PartialSegment, partial_segments};
@@ -211,6 +211,13 @@ impl<'a> Records<'a> {
     /// the position, metres, and of the heading, radians.
     pub(crate) fn end_errors(&self, run: (usize, usize), model: &Model) -> impl Iterator<Item = (f64, f64)> {
         self.segments.iter().filter(move |segment| segment.run == run).filter_map(|segment| segment.end_error(model))
+    }
+
+    /// The extrinsics that measurements depend on: without measured headings, none that turns them.
+    pub(crate) fn extrinsics(&self) -> &'static [Column] {
+        let mut measured = self.segments.iter().flat_map(|segment| &segment.measurements);
+        let all = Column::EXTRINSICS.as_slice();
+        if measured.any(|measurement| measurement.theta_rad.is_some()) { all } else { &all[..2] }
     }
 
     /// Approximate heading of the sensor on the robot, radians: from the directions of the measured and the

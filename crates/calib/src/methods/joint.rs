@@ -66,6 +66,9 @@ impl Joint {
 const BENDS_ALIKE: &str =
     "the runs bend alike, so that wheels and separation make up for each other: add straights, and turns both ways";
 
+/// Why the instrument's heading on the robot is not determined.
+const NO_HEADINGS: &str = "no heading was measured: positions are the same however the instrument is turned";
+
 /// Why large datasets are not calibrated.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -136,18 +139,22 @@ fn calibration(fit: &ModelFit<'_>, ticks_per_rev: Option<f64>, names: &[&str]) -
     let instrument = fit.mean_instrument();
     let extrinsics = fit.has(Column::SensorX).then(|| Extrinsics {
         body_from_sensor: instrument.body_from_sensor,
-        covariance: fit
-            .position(Column::SensorX)
-            .filter(|_| covariance.is_some())
-            .map(|first| Matrix3::from_fn(|i, j| var(first + i, first + j).unwrap_or(f64::NAN))),
+        covariance: covariance.as_ref().filter(|_| fit.position(Column::SensorX).is_some()).map(|_| {
+            let rows = Column::EXTRINSICS.map(|column| fit.position(column));
+            Matrix3::from_fn(|i, j| rows[i].zip(rows[j]).and_then(|(i, j)| var(i, j)).unwrap_or(f64::NAN))
+        }),
     });
     let latency_sigma_s = fit.position(Column::Latency).and_then(|row| var(row, row)).map(f64::sqrt);
+    let mut drive = calibrated_drive(fit, covariance.as_ref(), ticks_per_rev)?;
+    if extrinsics.is_some() && !fit.has(Column::SensorTheta) {
+        drive.not_observable.push(NotObservable { parameter: Parameter::SensorTheta, why: NO_HEADINGS });
+    }
     Ok(Calibration {
         extrinsics,
         latency_s: fit.has(Column::Latency).then_some((instrument.latency_s, latency_sigma_s)),
         group_instruments: group_instruments(fit, names),
         runs_rejected: rejected(fit),
-        ..calibrated_drive(fit, covariance.as_ref(), ticks_per_rev)?
+        ..drive
     })
 }
 

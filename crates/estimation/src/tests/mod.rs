@@ -28,6 +28,7 @@ mod restored;
 mod rounding;
 mod scores;
 mod selection;
+mod sensor_position;
 mod systematic_errors;
 mod timing;
 mod wall_start;
