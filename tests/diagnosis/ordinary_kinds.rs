@@ -361,6 +361,14 @@ const KINDS: &[(&str, Change, &[&str])] = &[
         &["truth_lever_arm"],
     ),
     (
+        "poses 100 ms late, of a marker turned by 0.19 rad",
+        |of| {
+            of.latency_s = 0.1;
+            mount(of, [0.0, 0.0, 0.19]);
+        },
+        &["truth_latency", "truth_yaw"],
+    ),
+    (
         "positions of a marker 15 cm behind, one long log",
         |of| {
             (of.reports, of.joined) = (Reports::Positions, true);

@@ -58,6 +58,8 @@ pub(crate) enum Basis {
     ClockOffset(f64),
     /// The robot's clock gains so many seconds a second on the instrument's.
     ClockDrift(f64),
+    /// The extrinsics of the base fit.
+    Extrinsics,
     /// Stretches of runs that do not belong, the largest first.
     Anomalies(Vec<Anomaly>),
     /// A fault of the records, in words.

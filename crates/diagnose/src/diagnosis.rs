@@ -18,6 +18,7 @@ use crate::clock_offsets::clock_offsets;
 use crate::clock_profile::RunClock;
 use crate::detectability::detectability;
 use crate::document::{Document, Gain};
+use crate::extrinsics;
 use crate::finding::Finding;
 use crate::findings::{StageResults, findings};
 use crate::gain::gain_by_level;
@@ -261,7 +262,9 @@ fn stages(
             (by_counts.as_ref(), with_stamps.as_deref().and_then(fit_as_stamped), records, base)
         }
     };
-    let is_open = |candidate: &Candidate| stamps.is_none_or(|error| error.candidate.id() != candidate.id());
+    let is_open = |candidate: &Candidate| {
+        stamps.is_none_or(|error| error.candidate.id() != candidate.id()) && !extrinsics::has_instead(&base, candidate)
+    };
     let mut catalogue: Vec<Candidate> = every_term.into_iter().filter(is_open).collect();
     let mut structure = mean_structure(records, base, &catalogue);
     // Where the counts do not follow the robot at all, no small effect has a meaning: only one with which

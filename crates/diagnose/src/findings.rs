@@ -10,6 +10,7 @@ use crate::cause::{Basis, Doubt};
 use crate::check::TestResult;
 use crate::clock_drift::ClockDrift;
 use crate::clock_offsets::ClockOffset;
+use crate::extrinsics;
 use crate::finding;
 use crate::finding::Finding;
 use crate::geometry_deviations::remaining_deviations;
@@ -74,8 +75,9 @@ type Stage = fn(&StageResults<'_, '_>, Vec<Finding>) -> Vec<Finding>;
 
 /// The findings, record faults first, then by significance.
 pub(crate) fn findings(results: &StageResults<'_, '_>) -> Vec<Finding> {
-    let stages: [Stage; 19] = [
+    let stages: [Stage; 20] = [
         record_faults,
+        extrinsics,
         mean_effects,
         clocks,
         stamps,
@@ -100,6 +102,15 @@ pub(crate) fn findings(results: &StageResults<'_, '_>) -> Vec<Finding> {
 
 fn record_faults(results: &StageResults<'_, '_>, _: Vec<Finding>) -> Vec<Finding> {
     results.faults.iter().map(|fault| finding::of_fault(fault)).collect()
+}
+
+/// Extrinsics that were fitted before effects were sought.
+fn extrinsics(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    // Extrinsics of a motion that is not the robot's are none.
+    if !results.uncorrelated {
+        findings.extend(extrinsics::of_base(&results.structure.base, results.without));
+    }
+    findings
 }
 
 /// Effects of the mean; where one uncatalogued term explains nearly as much, with that doubt.

@@ -26,6 +26,7 @@ mod document;
 mod errors_at_rest;
 mod extended_model;
 mod extended_scenario;
+mod extrinsics;
 mod finding;
 mod findings;
 mod fit_cache;

@@ -234,6 +234,9 @@ fn basis(finding: &Finding) -> String {
             let gains = if *rate > 0.0 { "gains" } else { "loses" };
             format!("the robot's clock {gains} {:.3} % on the instrument's", 100.0 * rate.abs())
         }
+        Basis::Extrinsics => {
+            format!("{}, fitted with the wheels before effects were sought", listed(&finding.parameters))
+        }
         Basis::Anomalies(all) => anomalies(all),
         Basis::RecordFault(sentence) => sentence.clone(),
         Basis::IsolatedErrors(isolated, of) => {

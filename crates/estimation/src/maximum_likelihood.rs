@@ -27,7 +27,8 @@ pub struct FitSettings {
 impl FitSettings {
     /// What calibration uses.
     pub const CALIBRATION: Self = Self { nuisances: true, thin: true, thin_displacements: false };
-    /// Geometry and noise from every measurement; extrinsics stay nominal.
+    /// Geometry and noise from every measurement; extrinsics stay nominal, unless the instrument is turned or
+    /// sees positions from elsewhere than the centre, which the first fit cannot do without.
     pub const GEOMETRY_ONLY: Self = Self { nuisances: false, thin: false, thin_displacements: false };
 
     /// Fits one robot's sessions.
@@ -57,10 +58,7 @@ impl FitSettings {
         let nominal = Model::of(&first.robot.geometry()?, 0);
         let mut found = ModelFit::before_any_step(sessions, nominal, ends, self.thin_displacements);
         found.free_extrinsics_if_rotated();
-        if self.nuisances {
-            found.free_extrinsics_if_elsewhere();
-        }
-        found.refit(None, &mut [])?;
+        found.first_fit()?;
         found.fix_unobservable()?;
         let explained = if self.nuisances { explained_by_nuisances(&found, self.thin)? } else { Explained::NotTried };
         let is_explained = matches!(explained, Explained::Yes(_));

@@ -19,8 +19,8 @@ use crate::pass_options::{OutlierGate, PassOptions};
 use crate::records::Records;
 use crate::segment::Segment;
 use crate::settings::{
-    MAX_AUTOCORRELATION_LAG, MAX_NOMINAL_DEVIATION, MAX_OBSERVABLE_SIGMA, MIN_NAMED_DIRECTION, MIN_OWN_DIRECTION,
-    MIN_RUNS_TO_HOLD_OUT, ROTATED_SENSOR_RAD, WHITENESS_Z,
+    DRIVE_PRIOR_SIGMA, MAX_AUTOCORRELATION_LAG, MAX_NOMINAL_DEVIATION, MAX_OBSERVABLE_SIGMA, MIN_NAMED_DIRECTION,
+    MIN_OWN_DIRECTION, MIN_RUNS_TO_HOLD_OUT, MIN_SENSOR_POSITION_CHI_SQUARE, ROTATED_SENSOR_RAD, WHITENESS_Z,
 };
 use crate::stated_wheels::with_stated_wheels;
 use crate::thinning::{Selection, Thinning};
@@ -132,12 +132,31 @@ impl ModelFit<'_> {
         }
     }
 
-    /// Frees the extrinsics of a sensor of positions that is not at the drive's centre.
-    pub(crate) fn free_extrinsics_if_elsewhere(&mut self) {
-        if let Some([x_m, y_m]) = self.records.sensor_position_m(&self.nominal) {
-            self.start.body_from_sensor = Pose::new(x_m, y_m, self.start.body_from_sensor.theta_rad);
-            self.columns.extend(self.records.extrinsics());
+    /// The first fit. The extrinsics of a sensor of positions are free where it is elsewhere than at the
+    /// drive's centre by the dead-reckoned paths, and by the fit: what the paths show may be another effect.
+    pub(crate) fn first_fit(&mut self) -> Result<(), EstimationError> {
+        let Some([x_m, y_m]) = self.records.sensor_position_m(&self.nominal) else { return self.refit(None, &mut []) };
+        let centred = self.clone();
+        self.start.body_from_sensor = Pose::new(x_m, y_m, self.start.body_from_sensor.theta_rad);
+        self.columns.extend(self.records.extrinsics());
+        self.refit(None, &mut [])?;
+        if self.sensor_position_chi_square().is_none_or(|chi_square| chi_square < MIN_SENSOR_POSITION_CHI_SQUARE) {
+            *self = centred;
+            self.refit(None, &mut [])?;
         }
+        Ok(())
+    }
+
+    /// The square of the sensor's position in its standard deviations, of a drive as it is stated but for
+    /// what the measurements show.
+    fn sensor_position_chi_square(&self) -> Option<f64> {
+        let precision = |column| if Column::GEOMETRY.contains(column) { DRIVE_PRIOR_SIGMA.powi(-2) } else { 0.0 };
+        let information = self.solution.information(&self.columns)?.with_precision(self.columns.iter().map(precision));
+        let rows = [self.position(Column::SensorX)?, self.position(Column::SensorY)?];
+        let covariance = information.solve()?.1.select_rows(&rows).select_columns(&rows);
+        let Pose { x_m, y_m, .. } = self.solution.model.body_from_sensor;
+        let position = DVector::from_vec(vec![x_m, y_m]);
+        Some(position.dot(&covariance.cholesky()?.solve(&position)))
     }
 
     /// Fits the free columns from given values, or from where the fit began. `terms` are those of the fit.

@@ -214,9 +214,10 @@ pub(crate) const TIMING_NOISE_TOLERANCE: f64 = 0.05;
 /// Tuned: by hand; no record of what on.
 pub(crate) const RESTART_AFTER_OUTLIERS: u32 = 2;
 
-/// Factor by which nuisances must reduce the number of outliers to explain them.
+/// Factor by which nuisances must reduce the number of outliers, or the time between measurements whose
+/// errors are not autocorrelated, to explain them.
 /// Tuned: by hand; no record of what on.
-pub(crate) const MIN_OUTLIER_REDUCTION: usize = 2;
+pub(crate) const MIN_NUISANCE_REDUCTION: f64 = 2.0;
 
 // Whiteness; thinning has a file of its own.
 
