@@ -252,6 +252,13 @@ fn show(report: &CalibrationReport, robot: &NominalRobot, runs: usize, terminal:
         for rejected in &method.runs_rejected {
             terminal.say(&format!("  rejected {}: {}", rejected.run, rejected.why))?;
         }
+        if let Some(noise) = method.noise.filter(|noise| noise.is_assumed) {
+            let wheel_mm = 1e3 * noise.wheel_sigma_m_per_sqrt_m;
+            terminal.say(&format!(
+                "  the measurements are no more than what is fitted to them and show no scatter: sigma is that of \
+                 wheels that err by {wheel_mm:.1} mm/√m, as is usual; more runs would show theirs"
+            ))?;
+        }
         for warning in &method.warnings {
             terminal.remark(&format!("warning: {name}: {warning}"));
         }

@@ -41,6 +41,7 @@ impl GivenCalibration {
             let noise = OdometryNoise {
                 wheel_sigma_m_per_sqrt_m: scenario.noise.wheel_sigma_m_per_sqrt_m,
                 turn_sigma_rad_per_sqrt_rad: 0.0,
+                is_assumed: false,
             };
             return Ok(vec![of(Given::Model(model), Some(noise), &[])]);
         }

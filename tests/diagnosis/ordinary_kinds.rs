@@ -48,6 +48,9 @@ const KINDS: &[(&str, Change, &[&str])] = &[
         &[],
     ),
     ("ends of runs", |of| of.reports = Reports::FirstAndLast, &[]),
+    ("ends of four drives", |of| (of.reports, of.only, of.runs) = (Reports::FirstAndLast, Some("free"), 4), &[]),
+    // As many numbers as lengths: no scatter shows.
+    ("ends of a drive", |of| (of.reports, of.only, of.runs) = (Reports::FirstAndLast, Some("free"), 1), &[]),
     ("positions", |of| of.reports = Reports::Positions, &[]),
     ("truth at 50 Hz", |of| of.truth_hz = 50.0, &[]),
     ("truth at 1 Hz", |of| of.truth_hz = 1.0, &[]),

@@ -115,6 +115,10 @@ pub struct OdometryNoise {
     pub wheel_sigma_m_per_sqrt_m: f64,
     /// Of the heading beyond that of the wheels: this times the root of the turn, rad/√rad.
     pub turn_sigma_rad_per_sqrt_rad: f64,
+    /// It is what is usual of robots, and the standard deviations of what was estimated with it: the
+    /// measurements are no more than what is fitted to them, so that they show no scatter.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub is_assumed: bool,
 }
 
 /// A parameter that the data do not determine.

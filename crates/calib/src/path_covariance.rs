@@ -41,7 +41,8 @@ mod tests {
 
     #[test]
     fn a_straight_and_a_spin_have_their_closed_forms() {
-        let noise = OdometryNoise { wheel_sigma_m_per_sqrt_m: 1e-3, turn_sigma_rad_per_sqrt_rad: 2e-3 };
+        let noise =
+            OdometryNoise { wheel_sigma_m_per_sqrt_m: 1e-3, turn_sigma_rad_per_sqrt_rad: 2e-3, is_assumed: false };
         let straight: Vec<(f64, Pose)> =
             (0..=10).map(|k| (f64::from(k), Pose::new(0.1 * f64::from(k), 0.0, 0.0))).collect();
         let end = path_covariances(&straight, 0.4, &noise)[10];

@@ -418,7 +418,11 @@ mod tests {
             dataset: Names::of(vec!["a".to_owned()]),
             methods: vec![MethodReport {
                 group_instruments: Vec::new(),
-                noise: Some(OdometryNoise { wheel_sigma_m_per_sqrt_m: 1e-3, turn_sigma_rad_per_sqrt_rad: 2e-3 }),
+                noise: Some(OdometryNoise {
+                    wheel_sigma_m_per_sqrt_m: 1e-3,
+                    turn_sigma_rad_per_sqrt_rad: 2e-3,
+                    is_assumed: false,
+                }),
                 method: "umbmark".to_owned(),
                 error: None,
                 parameters: [

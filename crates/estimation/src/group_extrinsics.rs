@@ -25,6 +25,11 @@ pub(crate) struct GroupResponse {
 }
 
 impl GroupResponse {
+    /// How many columns the group has for itself.
+    pub(crate) fn columns(&self) -> usize {
+        self.rest.len()
+    }
+
     /// The step of the own columns that follows from a step of some others.
     pub(crate) fn step(&self, columns: &[Column], step: &DVector<f64>) -> DVector<f64> {
         columns

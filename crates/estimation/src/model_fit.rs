@@ -406,6 +406,13 @@ impl ModelFit<'_> {
         self.columns.iter().position(|of| *of == column)
     }
 
+    /// Whether what is fitted explains all that was measured: the noise, and every standard deviation with
+    /// it, is that of the prior then.
+    #[must_use]
+    pub fn shows_no_scatter(&self) -> bool {
+        self.solution.pass.shows_no_scatter(self.free_basis().ncols())
+    }
+
     /// An orthonormal basis of the directions of the free columns that are observable.
     #[must_use]
     pub fn free_basis(&self) -> DMatrix<f64> {

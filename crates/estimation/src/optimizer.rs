@@ -162,7 +162,7 @@ pub(crate) fn fit_from(
                 found.innovations.iter().flatten().map(|innovation| innovation.z.powi(2)).collect();
             let middle = squares.len() / 2;
             if noise_score {
-                let step = NoiseStep::of(&noise, &found, prior);
+                let step = NoiseStep::of(&noise, &found, prior, basis.ncols());
                 take_noise_step(&mut noise, step.by);
             } else if squares.is_empty() {
                 break;
@@ -198,7 +198,8 @@ pub(crate) fn fit_from(
         let by_cached = PassOptions { keep: keep && cached.is_none(), by: cached.as_ref(), ..pass_options };
         let mut found = pass(records, selections, &model, &noise, &headings, terms, by_cached);
         let mean = MeanStep::of(&found, options, &basis)?;
-        let of_noise = if options.noise_fixed { NoiseStep::none() } else { NoiseStep::of(&noise, &found, prior) };
+        let of_noise =
+            if options.noise_fixed { NoiseStep::none() } else { NoiseStep::of(&noise, &found, prior, basis.ncols()) };
         let columns = options.columns.len();
         let damped = damping.damped(of_noise.by);
         let own = if acceleration.engages(StepSize { mean: mean.squared, noise: of_noise.by.amax() }) {
@@ -397,9 +398,9 @@ impl NoiseStep {
         Self { by: Vector4::zeros(), information: Matrix4::identity() }
     }
 
-    fn of(noise: &Noise, found: &Pass, prior: &NoisePrior) -> Self {
+    fn of(noise: &Noise, found: &Pass, prior: &NoisePrior, parameters: usize) -> Self {
         let pull = prior.pull(noise);
-        let gradient = found.noise.gradient + Vector4::from(pull.map(|(gradient, _)| gradient));
+        let gradient = found.restricted_noise_score(parameters) + Vector4::from(pull.map(|(gradient, _)| gradient));
         let information =
             found.noise.information + Matrix4::from_diagonal(&Vector4::from(pull.map(|(_, curvature)| curvature)));
         let directions = prior.directions();

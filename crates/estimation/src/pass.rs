@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use kinematics::InstructionSet;
 use model_term::ModelTerm;
+use nalgebra::Vector4;
 use rayon::prelude::*;
 
 use crate::filter::{Filter, FilterRun};
@@ -74,6 +75,32 @@ impl Pass {
     #[must_use]
     pub fn chi_square_of_headings(&self) -> f64 {
         self.headings.iter().map(|heading| heading.response.information * heading.response.rest.powi(2)).sum()
+    }
+
+    /// Score of the cost by the logarithms of the variances where so many parameters are fitted beside start
+    /// headings and the groups' own instruments: they take up a part of the scatter, which the likelihood
+    /// counts as none. Restricted likelihood (Patterson & Thompson 1971), exact where one factor scales all
+    /// variances: ½ tr S⁻¹ ∂S/∂ln σ² of each counts by the share of the measurements that is not taken up.
+    pub(crate) fn restricted_noise_score(&self, parameters: usize) -> Vector4<f64> {
+        let (measured, fitted) = self.measured_and_fitted(parameters);
+        // The rows of the information add up to the traces, as the variances do to S.
+        self.noise.gradient - self.noise.information * Vector4::repeat((fitted / measured).min(1.0))
+    }
+
+    /// How many numbers were measured, and how many are fitted to them beside so many parameters: start
+    /// headings, and the groups' own instruments.
+    fn measured_and_fitted(&self, parameters: usize) -> (f64, f64) {
+        let own: usize = self.own.iter().map(GroupResponse::columns).sum();
+        let headings = self.headings.len() as f64;
+        let measured = self.runs.iter().map(|run| run.count).sum::<f64>() + headings;
+        (measured.max(1.0), (parameters + own) as f64 + headings)
+    }
+
+    /// Whether so many parameters explain all that was measured, so that no scatter shows.
+    pub(crate) fn shows_no_scatter(&self, parameters: usize) -> bool {
+        let (measured, fitted) = self.measured_and_fitted(parameters);
+        // Outliers are taken in part where measurements are thinned.
+        measured < fitted + 0.5
     }
 
     /// Of no run.

@@ -110,7 +110,8 @@ mod tests {
             terms: Vec::new(),
             is_silent: false,
         };
-        let noise = Some(OdometryNoise { wheel_sigma_m_per_sqrt_m: 0.0, turn_sigma_rad_per_sqrt_rad: 0.0 });
+        let noise =
+            Some(OdometryNoise { wheel_sigma_m_per_sqrt_m: 0.0, turn_sigma_rad_per_sqrt_rad: 0.0, is_assumed: false });
         CalibratedRobot { noise, effects: vec![effect], ..specimen() }
     }
 

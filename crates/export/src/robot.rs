@@ -114,7 +114,7 @@ impl CalibratedRobot {
             return Err(ExportError::NoResult { place: place.to_owned(), method, why });
         }
         refuse_other_robot(place, method, robot)?;
-        if let Some(OdometryNoise { wheel_sigma_m_per_sqrt_m, turn_sigma_rad_per_sqrt_rad }) = method.noise {
+        if let Some(OdometryNoise { wheel_sigma_m_per_sqrt_m, turn_sigma_rad_per_sqrt_rad, .. }) = method.noise {
             for value in [wheel_sigma_m_per_sqrt_m, turn_sigma_rad_per_sqrt_rad] {
                 if !(value.is_finite() && value >= 0.0) {
                     return Err(ExportError::BadNoise { place: place.to_owned(), value });
@@ -177,6 +177,7 @@ impl CalibratedRobot {
             noise: Some(OdometryNoise {
                 wheel_sigma_m_per_sqrt_m: scenario.noise.wheel_sigma_m_per_sqrt_m,
                 turn_sigma_rad_per_sqrt_rad: 0.0,
+                is_assumed: false,
             }),
             is_extended: true,
             effects: model.effects.iter().filter_map(|effect| of_robot(effect, model)).collect(),
@@ -352,7 +353,11 @@ pub(crate) fn specimen() -> CalibratedRobot {
         wheel_separation: length(0.408, 2e-4, 0.4),
         ticks_per_rev: Some(10_000.0),
         counter_bits: None,
-        noise: Some(OdometryNoise { wheel_sigma_m_per_sqrt_m: 1e-3, turn_sigma_rad_per_sqrt_rad: 2e-3 }),
+        noise: Some(OdometryNoise {
+            wheel_sigma_m_per_sqrt_m: 1e-3,
+            turn_sigma_rad_per_sqrt_rad: 2e-3,
+            is_assumed: false,
+        }),
         is_extended: false,
         effects: Vec::new(),
         cautions: Vec::new(),
@@ -435,7 +440,11 @@ mod tests {
         assert!(matches!(of(&method(&WHOLE), Some(&other)), Err(ExportError::OtherRobot { .. })));
         assert!(of(&method(&WHOLE), Some(&NOMINAL)).is_ok());
         let mut noisy = method(&WHOLE);
-        noisy.noise = Some(OdometryNoise { wheel_sigma_m_per_sqrt_m: f64::NAN, turn_sigma_rad_per_sqrt_rad: 0.0 });
+        noisy.noise = Some(OdometryNoise {
+            wheel_sigma_m_per_sqrt_m: f64::NAN,
+            turn_sigma_rad_per_sqrt_rad: 0.0,
+            is_assumed: false,
+        });
         assert!(matches!(of(&noisy, None), Err(ExportError::BadNoise { .. })));
         let mut stopped = method(&WHOLE);
         stopped.converged = false;

@@ -297,7 +297,7 @@ fn a_plain_calibration_compiled_is_the_same_over_an_hour() {
     if !has_compiler("a_plain_calibration_compiled_is_the_same_over_an_hour") {
         return;
     }
-    let noise = OdometryNoise { wheel_sigma_m_per_sqrt_m: 1e-3, turn_sigma_rad_per_sqrt_rad: 4e-3 };
+    let noise = OdometryNoise { wheel_sigma_m_per_sqrt_m: 1e-3, turn_sigma_rad_per_sqrt_rad: 4e-3, is_assumed: false };
     for (noise, name) in [(Some(noise), "noise"), (None, "no_noise")] {
         let robot = plain(noise);
         let (off, off_covariance) = differences(&compiled(&header(&robot), name, false), &in_rust(&robot, false));

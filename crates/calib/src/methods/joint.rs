@@ -162,6 +162,7 @@ fn calibration(fit: &ModelFit<'_>, ticks_per_rev: Option<f64>, names: &[&str]) -
 fn noise(fit: &ModelFit<'_>) -> OdometryNoise {
     let noise = &fit.solution.noise;
     OdometryNoise {
+        is_assumed: fit.shows_no_scatter(),
         wheel_sigma_m_per_sqrt_m: noise.sigma(NoiseComponent::Wheel),
         turn_sigma_rad_per_sqrt_rad: noise.sigma(NoiseComponent::Turn),
     }

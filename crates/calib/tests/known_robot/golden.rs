@@ -125,7 +125,11 @@ fn drifts(text: &mut String) -> std::fmt::Result {
     for run in &session.runs {
         let corrected = corrected_run(&session, run, &joint, &mut 0.0);
         let corrected = corrected.map(|run| (run.length_m, run.poses[0], run.poses[run.poses.len() - 1], run.poses));
-        let noise = calib::OdometryNoise { wheel_sigma_m_per_sqrt_m: 1e-3, turn_sigma_rad_per_sqrt_rad: 2e-3 };
+        let noise = calib::OdometryNoise {
+            wheel_sigma_m_per_sqrt_m: 1e-3,
+            turn_sigma_rad_per_sqrt_rad: 2e-3,
+            is_assumed: false,
+        };
         let covariances = corrected.as_ref().map(|(_, _, _, poses)| path_covariances(poses, 0.3, &noise));
         let last = covariances.and_then(|all| all.last().copied());
         writeln!(

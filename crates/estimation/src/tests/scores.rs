@@ -57,3 +57,21 @@ fn a_scan_has_samples_where_they_are_asked_for_and_nothing_of_columns_that_are_n
     // Sums of hundreds of roundings.
     assert!(near < 1e-12, "{near}");
 }
+
+/// A scale of all variances by S χ² over n has its restricted likelihood's maximum at χ²/(n − p).
+#[test]
+fn parameters_take_up_a_part_of_the_scatter() {
+    let dataset = dataset_of(4, true);
+    let pass_options = PassOptions { gate: OutlierGate::Off, noise_score: true, ..PassOptions::default() };
+    let found = run(&dataset, &MODEL, &NOISE, &[0.0; 4], pass_options);
+    let all = total(&found.runs).expect("runs");
+    // Counts are not rounded, so that the four variances make all of S: along their common scale the score is
+    // ½ (n − χ²), and that of the restricted likelihood ½ (n − p − χ²).
+    let along = |score: nalgebra::Vector4<f64>| score.sum();
+    let expected = |parameters: f64| 0.5 * (all.count - parameters - all.chi_square);
+    for parameters in [0_usize, 3, 40] {
+        let score = along(found.restricted_noise_score(parameters));
+        assert!((score - expected(parameters as f64)).abs() < 1e-9 * all.count, "{score} {parameters}");
+    }
+    assert!(!found.shows_no_scatter(all.count as usize - 1) && found.shows_no_scatter(all.count as usize));
+}
