@@ -409,6 +409,8 @@ mod tests {
     use super::*;
 
     fn report() -> CalibrationReport {
+        let noise =
+            OdometryNoise { wheel_sigma_m_per_sqrt_m: 1e-3, turn_sigma_rad_per_sqrt_rad: 2e-3, is_assumed: true };
         let value = ReportedValue::of;
         CalibrationReport {
             trained_on: vec![TrainedOn {
@@ -418,11 +420,7 @@ mod tests {
             dataset: Names::of(vec!["a".to_owned()]),
             methods: vec![MethodReport {
                 group_instruments: Vec::new(),
-                noise: Some(OdometryNoise {
-                    wheel_sigma_m_per_sqrt_m: 1e-3,
-                    turn_sigma_rad_per_sqrt_rad: 2e-3,
-                    is_assumed: false,
-                }),
+                noise: Some(noise),
                 method: "umbmark".to_owned(),
                 error: None,
                 parameters: [

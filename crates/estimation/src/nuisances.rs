@@ -10,7 +10,9 @@ use crate::model_fit::{ModelFit, unobservable};
 use crate::normal_equations::{NormalEquations, total};
 use crate::optimizer::Solution;
 use crate::pass_options::OutlierGate;
-use crate::settings::{BLOCKS_PER_RUN, FOLDS, MIN_HELD_OUT_GAIN_SIGMA, MIN_NUISANCE_REDUCTION, MIN_RUNS_TO_HOLD_OUT};
+use crate::settings::{
+    BLOCKS_PER_RUN, FOLDS, MIN_HELD_OUT_GAIN_SIGMA, MIN_OUTLIER_REDUCTION, MIN_RUNS_TO_HOLD_OUT, MIN_THINNING_REDUCTION,
+};
 use crate::thinning::Thinning;
 
 /// A run, or a part of one, with the fold that holds it out.
@@ -154,7 +156,7 @@ fn hidden_directions(fit: &ModelFit<'_>) -> usize {
 
 /// Autocorrelated innovations and outliers may be due to wrong extrinsics or latency. Fits these without
 /// thinning and without the gate. The fit is accepted if the one without nuisances has more than twice as
-/// many outliers, each thinned as it needs it, or is thinned to more than twice the time.
+/// many outliers, each thinned as it needs it, or is thinned ten times as much.
 pub(crate) fn explained_by_nuisances<'a>(
     fit: &ModelFit<'a>,
     thin: bool,
@@ -174,10 +176,10 @@ pub(crate) fn explained_by_nuisances<'a>(
     if thin && explained.is_to_be_thinned() {
         explained.thin()?;
     }
-    let is_reduced = |of: fn(&ModelFit<'_>) -> f64| MIN_NUISANCE_REDUCTION * of(&explained) < of(&plain);
-    let has_less_left =
-        is_reduced(|fit| fit.solution.pass.outliers.len() as f64) || is_reduced(|fit| fit.thinning.every_s);
-    Ok(if has_less_left { Explained::Yes(explained) } else { Explained::No { thinned: plain } })
+    let outliers = |fit: &ModelFit<'_>| fit.solution.pass.outliers.len();
+    let has_fewer_outliers = MIN_OUTLIER_REDUCTION * outliers(&explained) < outliers(&plain);
+    let is_thinned_less = MIN_THINNING_REDUCTION * explained.thinning.every_s < plain.thinning.every_s;
+    Ok(if has_fewer_outliers || is_thinned_less { Explained::Yes(explained) } else { Explained::No { thinned: plain } })
 }
 
 /// Cross-validation of some columns and of the groups' own: for each fold, one step on the other folds,

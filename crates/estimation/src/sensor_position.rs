@@ -5,11 +5,11 @@
 //! instrument is taken to be at the centre. A fit that begins there stays in a minimum of its own.
 //!
 //! In the complex plane, positions r of a window are at e^{iθ} m but for the window's place, which the means
-//! take: m = q + (e^{iφ} − 1) l + Σ p ∂q/∂p, with the path q and the turn φ that a drive reckons from the
+//! take: m = q + (e^{iφ} − 1) l + Σ p ∂q/∂p, with the path q and the turn φ of dead reckoning from the
 //! window's start, the instrument's place l, and corrections p of the drive. Of the best rotation θ of each
 //! window (Umeyama 1991, in the plane) the cost is a function of x = (l, p) alone, J(x) = Σ |r|² + |m|² −
 //! 2 |Σ r m̄|, which Newton's method minimises from several places. The drive is corrected, and its paths
-//! are reckoned anew.
+//! are found anew.
 
 use std::f64::consts::TAU;
 
@@ -100,8 +100,8 @@ impl Place {
     }
 }
 
-/// Sums over the positions of a window, each less its mean: of the measured r, of the reckoned q, and of the
-/// derivatives d of what is reckoned by each parameter.
+/// Sums over the positions of a window, each less its mean: of the measured r, of the dead-reckoned q, and of
+/// the derivatives d of m by each parameter.
 #[derive(Debug, Clone, Copy)]
 struct Window {
     /// Σ |r|² + |q|².
@@ -118,7 +118,7 @@ struct Window {
     freedom: f64,
 }
 
-/// Measured position, reckoned one, and its derivatives.
+/// Measured position, dead-reckoned one, and its derivatives.
 type Sample = [Complex<f64>; 2 + PARAMETERS];
 
 /// Windows of a segment, each until the robot has turned once, or has gone so far that its dead reckoning
@@ -148,13 +148,13 @@ fn windows(segment: &Segment<'_>, model: &Model, near: Complex<f64>) -> Vec<Wind
             gone_m += increment.distance_m.abs();
         }
         at = measurement.after;
-        let (reckoned, turn) = path_and_turn(pose);
+        let (path, turn) = path_and_turn(pose);
         let [left, right, separation] = moved_poses.map(|moved| {
-            let (path, turned) = path_and_turn(moved);
-            (path - reckoned + (turned - turn) * near).unscale(DRIVE_STEP)
+            let (moved, turned) = path_and_turn(moved);
+            (moved - path + (turned - turn) * near).unscale(DRIVE_STEP)
         });
         let seen = Complex::new(measurement.x_m, measurement.y_m);
-        samples.push([seen, reckoned, turn, Complex::<f64>::i() * turn, left, right, separation]);
+        samples.push([seen, path, turn, Complex::<f64>::i() * turn, left, right, separation]);
         let is_whole = turned_rad > TAU || gone_m > MAX_WINDOW_SEPARATIONS * model.separation_m;
         if is_whole && samples.len() >= MIN_WINDOW_POSITIONS {
             found.push(Window::of(&samples));

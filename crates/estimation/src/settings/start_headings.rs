@@ -47,6 +47,6 @@ pub(crate) const DRIVE_PRIOR_SIGMA: f64 = 0.05;
 /// Budgeted: 1e-4 of a path's curvature, 1e-12 of its rounding.
 pub(crate) const DRIVE_STEP: f64 = 1e-4;
 
-/// How often the paths are reckoned anew with a corrected drive.
+/// How often paths are found anew with a corrected drive.
 /// Derived: a drive that is off by 5 % leaves its square, then the square of that.
 pub(crate) const DRIVE_STEPS: u32 = 2;
