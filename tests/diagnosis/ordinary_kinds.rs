@@ -326,6 +326,14 @@ const KINDS: &[(&str, Change, &[&str])] = &[
         &["truth_latency", "unlisted", "truth_outliers"],
     ),
     (
+        "325 ticks, poses of 9 mm at 50 Hz, errors that last 0.25 s, four runs",
+        |of| {
+            (of.truth_sigma_m, of.truth_sigma_rad, of.truth_hz) = (9e-3, 12e-3, 50.0);
+            (of.truth_tau_s, of.runs, of.ticks_per_rev) = (0.25, 4, 325.0);
+        },
+        &["truth_correlated_noise"],
+    ),
+    (
         "positions of 5 mm at 1 Hz",
         |of| (of.reports, of.truth_sigma_m, of.truth_hz) = (Reports::Positions, 5e-3, 1.0),
         &[],

@@ -3,17 +3,19 @@
 //! Turns and distances between successive poses are compared with those of the counts between the same
 //! instants a time τ earlier. With n pairs and sums of squares S_θ and S_d of the differences, the profile
 //! log likelihood is −n/2 (ln S_θ + ln S_d). It needs no start pose, no path and no more than nominal wheels.
+//! Where poses are so frequent that their errors are as large as what lies between two, the poses of a pair
+//! are farther apart: a distance of errors has a length too, and errors that last are alike.
 //! Reference: Knapp & Carter 1976 (time delay by maximum likelihood).
 
 use dataset::{Dataset, RunView};
 use estimation::WheelAngleInterpolator;
-use kinematics::{DriveGeometry, Wheels, wrap_to_pi};
+use kinematics::{DriveGeometry, Increment, Wheels, wrap_to_pi};
 use rayon::prelude::*;
 
 use crate::log_rows::has_outlying_rows;
 use crate::settings::records::{
-    CLOCK_STEP_S, DRIFT_PARTS_PER_RUN, MAX_CLOCK_OFFSET_S, MAX_CLOCK_PAIRS, MAX_CLOCK_UNEXPLAINED, MAX_RATE_AT_REST,
-    MIN_CLOCK_OFFSET_S, MIN_CLOCK_PAIRS, MIN_CLOCK_SIGMAS, MIN_CLOCK_TURN_RAD, MIN_DRIFT_RUN_S,
+    CLOCK_STEP_S, CLOCK_UNEXPLAINED, DRIFT_PARTS_PER_RUN, MAX_CLOCK_OFFSET_S, MAX_CLOCK_PAIRS, MAX_CLOCK_UNEXPLAINED,
+    MAX_RATE_AT_REST, MIN_CLOCK_OFFSET_S, MIN_CLOCK_PAIRS, MIN_CLOCK_SIGMAS, MIN_CLOCK_TURN_RAD, MIN_DRIFT_RUN_S,
 };
 
 /// What a run's measurements say of its clock.
@@ -101,17 +103,30 @@ impl<'r> PosePairs<'r> {
     }
 
     /// The profile by the measurements of one of so many parts of the run, by as large a share of the pairs;
-    /// `None` where they are few, or the robot hardly moves.
+    /// `None` where they are few, or the robot hardly moves. Poses of a pair are twice as far apart, and
+    /// twice again, until counts explain what lies between them.
     fn profile(&self, [from_s, to_s]: [f64; 2], parts: usize) -> Option<Profile> {
-        let Self { rows_s, track, geometry, .. } = self;
         let of_part =
             self.poses.partition_point(|pose| pose.0 < from_s)..self.poses.partition_point(|pose| pose.0 <= to_s);
         let poses = &self.poses[of_part];
-        if poses.len() <= MIN_CLOCK_PAIRS {
-            return None;
+        let (mut found, mut apart) = (None, 1);
+        while poses.len() > MIN_CLOCK_PAIRS * apart {
+            let Some((profile, unexplained)) = self.profile_of(poses, apart, MAX_CLOCK_PAIRS / parts) else { break };
+            found = (unexplained < MAX_CLOCK_UNEXPLAINED).then_some(profile);
+            if unexplained < CLOCK_UNEXPLAINED {
+                break;
+            }
+            apart *= 2;
         }
-        let stride = poses.len().div_ceil(MAX_CLOCK_PAIRS / parts);
-        let pairs = || poses.windows(2).step_by(stride).map(|pair| (pair[0], pair[1]));
+        found
+    }
+
+    /// The profile by pairs of poses that are so many poses apart, of so many pairs at the most, and what
+    /// share of the motions the counts leave unexplained at the best offset.
+    fn profile_of(&self, poses: &[Pose4], apart: usize, most: usize) -> Option<(Profile, f64)> {
+        let Self { rows_s, track, geometry, .. } = self;
+        let stride = apart.max(poses.len().div_ceil(most));
+        let pairs = || poses.windows(apart + 1).step_by(stride).map(|pair| (pair[0], pair[apart]));
         let steps = (MAX_CLOCK_OFFSET_S / CLOCK_STEP_S).round() as i32;
         // Below a tenth of a milliradian and of a millimetre a pair nothing distinguishes offsets, nor below
         // the rounding of the counts at its ends: where a robot turns evenly, pairs that fall alike between
@@ -127,10 +142,10 @@ impl<'r> PosePairs<'r> {
                 let turned = |t_s: f64| turns_at(rows_s, track.turns(), t_s - offset_s);
                 let wheels =
                     turned(b.0).zip_with(turned(a.0), |b, a| b - a).zip_with(geometry.m_per_rad(), |rad, r| rad * r);
-                let turn_rad = (wheels.right - wheels.left) / geometry.wheel_separation_m();
-                let distance_m = 0.5 * (wheels.left + wheels.right);
-                turns += wrap_to_pi(b.3 - a.3 - turn_rad).powi(2);
-                distances += ((b.1 - a.1).hypot(b.2 - a.2) - distance_m.abs()).powi(2);
+                let moved = Increment::from_travel(wheels, geometry.wheel_separation_m());
+                let arc = moved.arc();
+                turns += wrap_to_pi(b.3 - a.3 - moved.turn_rad).powi(2);
+                distances += ((b.1 - a.1).hypot(b.2 - a.2) - arc.x_m.hypot(arc.y_m)).powi(2);
                 count += 1.0;
             }
             (turns / count, distances / count, count)
@@ -154,15 +169,10 @@ impl<'r> PosePairs<'r> {
         let turned = mean(|(a, b)| wrap_to_pi(b.3 - a.3).powi(2));
         let went = mean(|(a, b)| (b.1 - a.1).powi(2) + (b.2 - a.2).powi(2));
         let (turns_left, distances_left, _) = left_at(CLOCK_STEP_S * at);
-        let explains = if turned > MIN_CLOCK_TURN_RAD * MIN_CLOCK_TURN_RAD {
-            turns_left < MAX_CLOCK_UNEXPLAINED * turned
-        } else {
-            distances_left < MAX_CLOCK_UNEXPLAINED * went
-        };
-        if !explains {
-            return None;
-        }
-        Some(Profile { costs, offset_s: CLOCK_STEP_S * at, sigma_s: CLOCK_STEP_S / curvature.sqrt() })
+        let is_turning = turned > MIN_CLOCK_TURN_RAD * MIN_CLOCK_TURN_RAD;
+        let unexplained = if is_turning { turns_left / turned } else { distances_left / went };
+        let profile = Profile { costs, offset_s: CLOCK_STEP_S * at, sigma_s: CLOCK_STEP_S / curvature.sqrt() };
+        Some((profile, unexplained))
     }
 }
 
@@ -210,7 +220,7 @@ pub(crate) fn turns_at(rows_s: &[f64], turns: &Wheels<Vec<f64>>, t_s: f64) -> Wh
 #[cfg(test)]
 pub(crate) mod tests {
     use dataset::{Odometry, Run, RunInfo, TruthSample, WheelLog};
-    use kinematics::{Increment, Pose};
+    use kinematics::Pose;
 
     use super::*;
     use crate::small_robot::dataset_of;

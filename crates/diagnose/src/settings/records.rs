@@ -44,6 +44,10 @@ pub(crate) const MIN_CLOCK_GAIN: f64 = 20.0;
 /// is.
 pub(crate) const MAX_CLOCK_UNEXPLAINED: f64 = 0.5;
 
+/// Fraction. The same share above which poses are taken farther apart.
+/// Budgeted: a tenth, so that errors of poses are a third of what lies between them.
+pub(crate) const CLOCK_UNEXPLAINED: f64 = 0.1;
+
 /// Radians. Turns between poses below this, root mean square, are noise of headings.
 /// Budgeted: ten times the noise of an ordinary instrument.
 pub(crate) const MIN_CLOCK_TURN_RAD: f64 = 0.01;
