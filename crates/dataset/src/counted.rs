@@ -12,7 +12,9 @@ use kinematics::{DriveGeometry, Side, Twist, Wheels};
 
 use crate::median::median;
 use crate::record::{NominalRobot, Run, WheelLog};
-use crate::settings::{COUNT_TOLERANCE, MAX_CHANCE_OF_COUNTS, MAX_COUNTS, MAX_ROUNDED_COUNTS, MIN_COUNTED_SHARE};
+use crate::settings::{
+    COUNT_TOLERANCE, LEAST_COUNT_ERROR, MAX_CHANCE_OF_COUNTS, MAX_COUNTS, MAX_ROUNDED_COUNTS, MIN_COUNTED_SHARE,
+};
 
 /// Puts counts in place of recorded angles, where these are a whole number of the stated counts but for their
 /// rounding, and of rates, where these are one in a sampling period, or in the time since the row before.
@@ -44,8 +46,24 @@ trait Counted {
 struct Counts {
     /// By row; `None` where it is no whole number.
     by_row: Vec<Option<Wheels<f64>>>,
-    /// Counts that it is rounded by at the most.
-    rounded: f64,
+    /// What they are off whole numbers by at the most.
+    off: f64,
+}
+
+impl Counts {
+    /// By row what may be counts, and what each is rounded by at the most; `None` where that is not known.
+    fn of(rows: impl Iterator<Item = Option<(Wheels<f64>, Wheels<f64>)>>) -> Self {
+        let mut off = 0.0_f64;
+        let by_row = rows.map(|row| {
+            let (counts, rounded) = row?;
+            let whole = of_both(counts.zip_with(rounded, nearest_count))?;
+            let apart = counts.zip_with(whole, |counts, whole| (counts - whole).abs());
+            off = off.max(apart.left).max(apart.right);
+            Some(whole)
+        });
+        let by_row = by_row.collect();
+        Self { by_row, off }
+    }
 }
 
 /// The counts that the angles of a run may be made of, since the first row.
@@ -64,11 +82,11 @@ impl CountedAngles {
         let first = Wheels { left: *angles.left.first()?, right: *angles.right.first()? };
         let of_row = |(left, right): (&f64, &f64)| {
             let since_first = Wheels { left: left - first.left, right: right - first.right };
-            of_both(since_first.map(|rad| nearest_count(rad / rad_per_count, rounded)))
+            Some((since_first.map(|rad| rad / rad_per_count), Wheels::both(rounded)))
         };
-        let by_row = angles.left.iter().zip(&angles.right).map(of_row).collect();
+        let counts = Counts::of(angles.left.iter().zip(&angles.right).map(of_row));
         let first = first.map(|rad| (rad / rad_per_count).round());
-        Some(Self { counts: Counts { by_row, rounded }, first })
+        Some(Self { counts, first })
     }
 }
 
@@ -119,14 +137,11 @@ impl CountedRates {
         };
         let of_row = |(row, row_s): (usize, &f64)| {
             let speed_m_s = wheels.reported_speed_m_s(&geometry, row)?;
-            of_both(speed_m_s.zip_with(m_per_count, |speed_m_s, m_per_count| {
-                nearest_count(speed_m_s * row_s / m_per_count, rounded_m_s * row_s / m_per_count)
-            }))
+            let counts = speed_m_s.zip_with(m_per_count, |speed_m_s, m_per_count| speed_m_s * row_s / m_per_count);
+            Some((counts, m_per_count.map(|m_per_count| rounded_m_s * row_s / m_per_count)))
         };
-        let by_row = row_s.iter().enumerate().map(of_row).collect();
-        let rounded = rounded_m_s * usual_s / m_per_count.left.min(m_per_count.right);
         Some(Self {
-            counts: Counts { by_row, rounded },
+            counts: Counts::of(row_s.iter().enumerate().map(of_row)),
             row_s,
             is_missing: period.is_some_and(|period| period.numbers.windows(2).any(|pair| pair[1] - pair[0] != 1)),
             m_per_count,
@@ -186,15 +201,16 @@ fn nearest_count(counts: f64, rounded: f64) -> Option<f64> {
 }
 
 /// Are nearly all rows in which a wheel turned made of counts, and of so many numbers that it is no chance?
-/// What is not made of counts is within the rounding of one with twice that probability, and a robot that
-/// drives evenly says the same again and again.
+/// What is not made of counts is as near to a whole number as all are with twice that probability, and a
+/// robot that drives evenly says the same again and again.
 fn are_counted(runs: &[&impl Counted]) -> bool {
     let moving = || runs.iter().flat_map(|run| &run.counts().by_row).filter(|of| **of != Some(Wheels::both(0.0)));
     let counted: Vec<&Wheels<f64>> = moving().flatten().collect();
     let numbers: BTreeSet<(Side, i64)> =
         counted.iter().flat_map(|of| Side::BOTH.map(|side| (side, of[side] as i64))).collect();
-    let rounded = runs.iter().map(|run| run.counts().rounded).fold(0.0, f64::max);
-    let log_chance = numbers.len() as f64 * (2.0 * (rounded + COUNT_TOLERANCE)).ln();
+    // Whole numbers themselves are of a period that is known to so much.
+    let off = runs.iter().map(|run| run.counts().off).fold(LEAST_COUNT_ERROR, f64::max);
+    let log_chance = numbers.len() as f64 * (2.0 * off).ln();
     log_chance <= MAX_CHANCE_OF_COUNTS.ln() && counted.len() as f64 >= MIN_COUNTED_SHARE * moving().count() as f64
 }
 

@@ -60,6 +60,10 @@ pub(crate) const MAX_ROUNDED_COUNTS: f64 = 0.25;
 /// Budgeted: periods are known to some 1e-4, of a hundred counts.
 pub(crate) const COUNT_TOLERANCE: f64 = 0.02;
 
+/// What counts are taken to be off whole numbers by at the least.
+/// Budgeted: periods are known to some 1e-4, of a count; of equal rates all are off by as much.
+pub(crate) const LEAST_COUNT_ERROR: f64 = 1e-4;
+
 /// Share of the rows in which a wheel turns that are made of counts at the least.
 /// Budgeted: rows at the ends of gaps have times of their own.
 pub(crate) const MIN_COUNTED_SHARE: f64 = 0.98;
