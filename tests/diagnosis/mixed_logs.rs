@@ -286,6 +286,18 @@ fn of_seed(seed: u64) -> (Verdict, bool, Vec<f64>, String) {
     (verdict, drawn.fault.is_some(), if drawn.fault.is_none() { lengths.z } else { Vec::new() }, line)
 }
 
+/// The ends of two small squares do not determine the lengths, and say nothing of whether the odometry
+/// follows the robot: that it does not was a finding for sure. Rows of no whole number of counts but 0 and 1,
+/// with stamps that jitter by half of their period, were speeds with errors of their own.
+#[test]
+fn regress_ends_of_two_squares_say_nothing_of_the_odometry() {
+    let drawn = Mixed::drawn(6003);
+    let (folder, _) = drawn.robot.written();
+    let found = diagnosed_in(folder.path());
+    let why = found.as_ref().map_or_else(Clone::clone, |document| document.sentence.clone());
+    assert!(found.is_err() && why.contains("too few"), "{why}");
+}
+
 #[test]
 fn logs_that_differ_in_several_things_are_diagnosed_and_calibrated() {
     let (robots, first) = robots();

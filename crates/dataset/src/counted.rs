@@ -13,7 +13,8 @@ use kinematics::{DriveGeometry, Side, Twist, Wheels};
 use crate::median::median;
 use crate::record::{NominalRobot, Run, WheelLog};
 use crate::settings::{
-    COUNT_TOLERANCE, LEAST_COUNT_ERROR, MAX_CHANCE_OF_COUNTS, MAX_COUNTS, MAX_ROUNDED_COUNTS, MIN_COUNTED_SHARE,
+    COUNT_TOLERANCE, COUNT_TOLERANCE_RATIO, LEAST_COUNT_ERROR, MAX_CHANCE_OF_COUNTS, MAX_COUNTS, MAX_ROUNDED_COUNTS,
+    MIN_COUNT_TOLERANCE, MIN_COUNTED_SHARE,
 };
 
 /// Puts counts in place of recorded angles, where these are a whole number of the stated counts but for their
@@ -31,8 +32,20 @@ pub(crate) fn restore(runs: &mut [Run], robot: &NominalRobot) {
         is_certain
     }
     let _ = restored(runs, |run| CountedAngles::of(run, robot))
-        || restored(runs, |run| CountedRates::of(run, robot, true))
-        || restored(runs, |run| CountedRates::of(run, robot, false));
+        || [RowTime::Period, RowTime::Mean, RowTime::Stamps]
+            .into_iter()
+            .any(|of| restored(runs, |run| CountedRates::of(run, robot, of)));
+}
+
+/// The time that a driver divides counts by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum RowTime {
+    /// The sampling period.
+    Period,
+    /// The mean time between rows: where stamps jitter by as much as the period, it is known better.
+    Mean,
+    /// The time since the row before, by its stamp.
+    Stamps,
 }
 
 /// What a run may be made of.
@@ -114,7 +127,7 @@ struct CountedRates {
 }
 
 impl CountedRates {
-    fn of(run: &Run, robot: &NominalRobot, has_even_rows: bool) -> Option<Self> {
+    fn of(run: &Run, robot: &NominalRobot, row_time: RowTime) -> Option<Self> {
         let ticks_per_rev = robot.ticks_per_rev?;
         let geometry = robot.geometry().ok()?;
         let wheels = &run.odometry.wheels;
@@ -130,10 +143,11 @@ impl CountedRates {
         let since_s: Vec<f64> = t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let usual_s = median(since_s.clone())?;
         let period = t_s.sampling_period();
-        let row_s = if has_even_rows {
-            vec![period.map_or(usual_s, |period| period.period_s); t_s.len()]
-        } else {
-            [usual_s].into_iter().chain(since_s).collect()
+        let even = |row_s: f64| vec![row_s; t_s.len()];
+        let row_s = match row_time {
+            RowTime::Period => even(period.map_or(usual_s, |period| period.period_s)),
+            RowTime::Mean => even((t_s.last()? - t_s.first()?) / since_s.len() as f64),
+            RowTime::Stamps => [usual_s].into_iter().chain(since_s).collect(),
         };
         let of_row = |(row, row_s): (usize, &f64)| {
             let speed_m_s = wheels.reported_speed_m_s(&geometry, row)?;
@@ -196,13 +210,15 @@ fn of_both(counts: Wheels<Option<f64>>) -> Option<Wheels<f64>> {
 /// or there are so many that any number is whole.
 fn nearest_count(counts: f64, rounded: f64) -> Option<f64> {
     let nearest = counts.round();
-    let is_within = (counts - nearest).abs() <= rounded + COUNT_TOLERANCE;
+    let tolerance = (COUNT_TOLERANCE_RATIO * nearest.abs()).clamp(MIN_COUNT_TOLERANCE, COUNT_TOLERANCE);
+    let is_within = (counts - nearest).abs() <= rounded + tolerance;
     (is_within && rounded <= MAX_ROUNDED_COUNTS && nearest.abs() <= MAX_COUNTS).then_some(nearest)
 }
 
 /// Are nearly all rows in which a wheel turned made of counts, and of so many numbers that it is no chance?
-/// What is not made of counts is as near to a whole number as all are with twice that probability, and a
-/// robot that drives evenly says the same again and again.
+/// What is not made of counts is as near to a whole number as all are with twice that probability. A robot
+/// that drives evenly says the same again and again, so that a number counts once; but a row below or above
+/// both of those beside it is no even drive.
 fn are_counted(runs: &[&impl Counted]) -> bool {
     let moving = || runs.iter().flat_map(|run| &run.counts().by_row).filter(|of| **of != Some(Wheels::both(0.0)));
     let counted: Vec<&Wheels<f64>> = moving().flatten().collect();
@@ -210,8 +226,18 @@ fn are_counted(runs: &[&impl Counted]) -> bool {
         counted.iter().flat_map(|of| Side::BOTH.map(|side| (side, of[side] as i64))).collect();
     // Whole numbers themselves are of a period that is known to so much.
     let off = runs.iter().map(|run| run.counts().off).fold(LEAST_COUNT_ERROR, f64::max);
-    let log_chance = numbers.len() as f64 * (2.0 * off).ln();
+    let alone: usize = runs.iter().map(|run| rows_alone(&run.counts().by_row)).sum();
+    let log_chance = (numbers.len() + alone) as f64 * (2.0 * off).ln();
     log_chance <= MAX_CHANCE_OF_COUNTS.ln() && counted.len() as f64 >= MIN_COUNTED_SHARE * moving().count() as f64
+}
+
+/// In how many rows a wheel turns faster or slower than in both of those beside it.
+fn rows_alone(by_row: &[Option<Wheels<f64>>]) -> usize {
+    let is_alone = |rows: &&[Option<Wheels<f64>>]| {
+        let [Some(before), Some(row), Some(behind)] = rows else { return false };
+        Side::BOTH.iter().any(|&side| (row[side] - before[side]) * (row[side] - behind[side]) > 0.0)
+    };
+    by_row.windows(3).filter(is_alone).count()
 }
 
 #[cfg(test)]
@@ -303,6 +329,37 @@ mod tests {
             assert!(largest_error(&run, &exact) < 1e-9, "{is_twist}");
             assert_eq!(run.odometry.wheels.recorded_step(), None);
         }
+    }
+
+    /// Rows that are more frequent than counts, with stamps that are off by half of what is between two:
+    /// there are no counts but 0 and 1, and no beat.
+    #[test]
+    fn regress_rates_of_single_counts_are_the_counts() {
+        let m_per_count = 0.16 * std::f64::consts::PI / 500.0;
+        let off = |row: u32| 2.5e-3 * (f64::from(row * 7919 % 1000) / 1000.0 - 0.5);
+        let t_s: Vec<f64> = (0..2000).map(|row| 0.005 * f64::from(row) + off(row)).collect();
+        let at = |row: u32| (f64::from(row) * 0.37).floor();
+        let of = |ticks_per_rev: f64| {
+            let speeds: Vec<f64> = (0..2000).map(|row| (at(row + 1) - at(row)) * m_per_count / 0.005).collect();
+            let rounded = speeds.iter().map(|of| (of * 1e4).round() * 1e-4).collect();
+            let wheels = WheelLog::Speeds(Wheels::both(rounded));
+            let odometry = Odometry { t_s: t_s.clone().into(), wheels, ..Odometry::default() };
+            let mut run = Run { odometry, ..Run::default() };
+            restore(std::slice::from_mut(&mut run), &NominalRobot { ticks_per_rev: Some(ticks_per_rev), ..ROBOT });
+            run.odometry.wheels
+        };
+        let counts: Vec<i64> = (0..2000).map(|row| (at(row + 1) - at(1)) as i64).collect();
+        assert!(of(500.0) == WheelLog::Ticks(Wheels::both(counts)), "counts");
+        assert!(matches!(of(505.0), WheelLog::Speeds(_)), "another number of counts");
+    }
+
+    /// Two speeds again and again, of which one is a count, are what a robot was told to drive.
+    #[test]
+    fn even_drives_are_no_counts() {
+        let is_alone = |of: &[f64]| rows_alone(&of.iter().map(|of| Some(Wheels::both(*of))).collect::<Vec<_>>());
+        assert_eq!(is_alone(&[0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0]), 0);
+        assert_eq!(is_alone(&[0.0, 1.0, 0.0, 0.0, 2.0, 1.0, 2.0]), 3);
+        assert_eq!(rows_alone(&[Some(Wheels::both(0.0)), None, Some(Wheels::both(0.0))]), 0);
     }
 
     #[test]

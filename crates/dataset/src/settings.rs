@@ -56,9 +56,18 @@ pub(crate) const MIN_DISTINCT_RATES: usize = 8;
 /// Derived: half of it is halfway to the next.
 pub(crate) const MAX_ROUNDED_COUNTS: f64 = 0.25;
 
-/// Counts by which a rate is off a whole number beside its rounding.
+/// Counts by which a rate is off a whole number beside its rounding at the most.
 /// Budgeted: periods are known to some 1e-4, of a hundred counts.
 pub(crate) const COUNT_TOLERANCE: f64 = 0.02;
+
+/// The same as a share of the counts.
+/// Budgeted: twice what periods are known to.
+pub(crate) const COUNT_TOLERANCE_RATIO: f64 = 2e-4;
+
+/// The same of few counts.
+/// Budgeted: stamps that jitter by half a period leave as much of a hundred rows; numbers of counts that are
+/// taken for each other, 1000 and 1024, differ by five times as much.
+pub(crate) const MIN_COUNT_TOLERANCE: f64 = 5e-3;
 
 /// What counts are taken to be off whole numbers by at the least.
 /// Budgeted: periods are known to some 1e-4, of a count; of equal rates all are off by as much.

@@ -71,6 +71,12 @@ pub enum DiagnoseError {
         /// Share of measurements left out.
         percent: f64,
     },
+    /// The odometry does not follow the measurements, and these do not determine the geometry or are no more
+    /// than what is fitted to them.
+    #[error(
+        "the measurements are too few to say whether the odometry follows the robot; record more poses along the path, or more runs"
+    )]
+    TooFewMeasurements,
     /// There is no base fit.
     #[error("no calibrated model to ask: {0}")]
     NoFit(#[from] EstimationError),
@@ -276,6 +282,10 @@ fn stages(
         return Err(DiagnoseError::OdometryUncorrelated { percent: 100.0 * share });
     }
     let is_uncorrelated = !is_correlated(&found.fit, &found.candidates);
+    // Stated lengths that are not determined, and are off, look like odometry that does not follow.
+    if is_uncorrelated && (!structure.base.unobservable.is_empty() || structure.base.shows_no_scatter()) {
+        return Err(DiagnoseError::TooFewMeasurements);
+    }
     if is_uncorrelated {
         catalogue.clear();
         let base = structure.base;
