@@ -13,7 +13,7 @@ use kinematics::{DriveGeometry, Side, Twist, Wheels};
 use crate::median::median;
 use crate::record::{NominalRobot, Run, WheelLog};
 use crate::settings::{
-    COUNT_TOLERANCE, COUNT_TOLERANCE_RATIO, LEAST_COUNT_ERROR, MAX_CHANCE_OF_COUNTS, MAX_COUNTS, MAX_ROUNDED_COUNTS,
+    COUNT_TOLERANCE, COUNT_TOLERANCE_RATIO, MAX_CHANCE_OF_COUNTS, MAX_COUNTS, MAX_ROUNDED_COUNTS, MIN_COUNT_ERROR,
     MIN_COUNT_TOLERANCE, MIN_COUNTED_SHARE,
 };
 
@@ -225,7 +225,7 @@ fn are_counted(runs: &[&impl Counted]) -> bool {
     let numbers: BTreeSet<(Side, i64)> =
         counted.iter().flat_map(|of| Side::BOTH.map(|side| (side, of[side] as i64))).collect();
     // Whole numbers themselves are of a period that is known to so much.
-    let off = runs.iter().map(|run| run.counts().off).fold(LEAST_COUNT_ERROR, f64::max);
+    let off = runs.iter().map(|run| run.counts().off).fold(MIN_COUNT_ERROR, f64::max);
     let alone: usize = runs.iter().map(|run| rows_alone(&run.counts().by_row)).sum();
     let log_chance = (numbers.len() + alone) as f64 * (2.0 * off).ln();
     log_chance <= MAX_CHANCE_OF_COUNTS.ln() && counted.len() as f64 >= MIN_COUNTED_SHARE * moving().count() as f64

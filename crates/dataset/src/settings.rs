@@ -71,7 +71,7 @@ pub(crate) const MIN_COUNT_TOLERANCE: f64 = 5e-3;
 
 /// What counts are taken to be off whole numbers by at the least.
 /// Budgeted: periods are known to some 1e-4, of a count; of equal rates all are off by as much.
-pub(crate) const LEAST_COUNT_ERROR: f64 = 1e-4;
+pub(crate) const MIN_COUNT_ERROR: f64 = 1e-4;
 
 /// Share of the rows in which a wheel turns that are made of counts at the least.
 /// Budgeted: rows at the ends of gaps have times of their own.

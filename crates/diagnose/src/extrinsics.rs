@@ -6,7 +6,8 @@ use estimation::{Column, ModelFit};
 use kinematics::wrap_to_pi;
 use nalgebra::DVector;
 
-use crate::candidate::{Candidate, mean_terms};
+use crate::augmented_model::AugmentedModel;
+use crate::candidate::{Candidate, mean_terms, terms};
 use crate::cause::{Basis, Cause};
 use crate::finding::{Finding, of_causes, parameters};
 use crate::settings::levels::{MIN_QUANTILE_P_VALUE, SCAN_LEVEL};
@@ -31,14 +32,15 @@ pub(crate) fn has_instead(base: &ModelFit<'_>, candidate: &Candidate) -> bool {
     extrinsic_of(candidate).is_some_and(|extrinsic| columns_of(base, extrinsic).is_some())
 }
 
-/// What the extrinsics of a base fit are, where they are free and significant; a cause that is not to be
-/// named is unknown.
-pub(crate) fn of_base(base: &ModelFit<'_>, without: &[String]) -> Vec<Finding> {
-    let Some(covariance) = base.covariance(&mut []) else { return Vec::new() };
-    let sensor = base.solution.model.body_from_sensor;
+/// What the extrinsics of a model are that are free in its base fit, where they are significant beside what
+/// was found; a cause that is not to be named is unknown.
+pub(crate) fn of_model(model: &AugmentedModel<'_>, without: &[String]) -> Vec<Finding> {
+    let AugmentedModel { fit, candidates, .. } = model;
+    let Some(covariance) = fit.covariance(&mut terms(candidates)) else { return Vec::new() };
+    let sensor = fit.solution.model.body_from_sensor;
     let of_candidate = |candidate: Candidate| {
-        let columns = columns_of(base, extrinsic_of(&candidate)?)?;
-        let rows: Vec<usize> = columns.iter().filter_map(|column| base.position(*column)).collect();
+        let columns = columns_of(fit, extrinsic_of(&candidate)?)?;
+        let rows: Vec<usize> = columns.iter().filter_map(|column| fit.position(*column)).collect();
         let values = DVector::from_iterator(
             rows.len(),
             columns.iter().map(|column| match column {

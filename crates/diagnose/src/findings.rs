@@ -108,7 +108,7 @@ fn record_faults(results: &StageResults<'_, '_>, _: Vec<Finding>) -> Vec<Finding
 fn extrinsics(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
     // Extrinsics of a motion that is not the robot's are none.
     if !results.uncorrelated {
-        findings.extend(extrinsics::of_base(&results.structure.base, results.without));
+        findings.extend(extrinsics::of_model(results.structure.model(), results.without));
     }
     findings
 }

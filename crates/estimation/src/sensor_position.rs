@@ -6,8 +6,8 @@
 //!
 //! In the complex plane, positions r of a window are at e^{iθ} m but for the window's place, which the means
 //! take: m = q + (e^{iφ} − 1) l + Σ p ∂q/∂p, with the path q and the turn φ of dead reckoning from the
-//! window's start, the instrument's place l, and corrections p of the drive. Of the best rotation θ of each
-//! window (Umeyama 1991, in the plane) the cost is a function of x = (l, p) alone, J(x) = Σ |r|² + |m|² −
+//! window's start, the instrument's place l, and corrections p of the drive and the instrument's clock. Of
+//! the best rotation θ of each window (Umeyama 1991, in the plane) the cost is a function of x = (l, p) alone, J(x) = Σ |r|² + |m|² −
 //! 2 |Σ r m̄|, which Newton's method minimises from several places. The drive is corrected, and its paths
 //! are found anew.
 
@@ -20,13 +20,19 @@ use crate::model::{Column, Model};
 use crate::records::Records;
 use crate::segment::Segment;
 use crate::settings::{
-    DRIVE_PRIOR_SIGMA, DRIVE_STEP, DRIVE_STEPS, MAX_WINDOW_SEPARATIONS, MIN_SENSOR_POSITION_CHI_SQUARE,
-    MIN_WINDOW_POSITIONS, SENSOR_POSITION_STARTS, SENSOR_POSITION_STEPS, SENSOR_POSITION_TOLERANCE,
+    DRIVE_PRIOR_SIGMA, DRIVE_STEP, DRIVE_STEPS, LATENCY_PRIOR_SIGMA_S, MAX_WINDOW_SEPARATIONS,
+    MIN_SENSOR_POSITION_CHI_SQUARE, MIN_WINDOW_POSITIONS, SENSOR_POSITION_STARTS, SENSOR_POSITION_STEPS,
+    SENSOR_POSITION_TOLERANCE,
 };
 
-/// Place of the instrument ahead of the drive's centre and to the left, metres, and relative corrections of
-/// the drive's geometry.
-const PARAMETERS: usize = 2 + Column::GEOMETRY.len();
+/// Place of the instrument ahead of the drive's centre and to the left, metres, relative corrections of the
+/// drive's geometry, and the latency, seconds: of a robot that drives steadily it is a place behind the
+/// centre.
+const PARAMETERS: usize = 2 + Column::GEOMETRY.len() + 1;
+
+/// By how much a step moves what is no place of the instrument where the windows say nothing of it.
+const PRIOR_SIGMAS: [f64; PARAMETERS - 2] =
+    [DRIVE_PRIOR_SIGMA, DRIVE_PRIOR_SIGMA, DRIVE_PRIOR_SIGMA, LATENCY_PRIOR_SIGMA_S];
 
 type Values = SVector<f64, PARAMETERS>;
 
@@ -40,7 +46,7 @@ impl Records<'_> {
         };
         let of_nominal = windows(nominal, Complex::default());
         let at_start: Vec<Values> = starts(&of_nominal).collect();
-        let centre = Place::found(&windows, nominal, of_nominal.clone(), &[Values::zeros()], Free::Drive)?;
+        let centre = Place::found(&windows, nominal, of_nominal.clone(), &[Values::zeros()], Free::Others)?;
         let place = Place::found(&windows, nominal, of_nominal, &at_start, Free::All)?;
         let gain = centre.cost - place.cost;
         (gain > MIN_SENSOR_POSITION_CHI_SQUARE * place.variance()?).then_some(place.position_m)
@@ -50,10 +56,10 @@ impl Records<'_> {
 /// What moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Free {
-    /// The instrument's place and the drive.
+    /// The instrument's place and what is beside it.
     All,
-    /// The drive.
-    Drive,
+    /// What is beside it.
+    Others,
 }
 
 /// A minimum of the cost.
@@ -154,7 +160,11 @@ fn windows(segment: &Segment<'_>, model: &Model, near: Complex<f64>) -> Vec<Wind
             (moved - path + (turned - turn) * near).unscale(DRIVE_STEP)
         });
         let seen = Complex::new(measurement.x_m, measurement.y_m);
-        samples.push([seen, path, turn, Complex::<f64>::i() * turn, left, right, separation]);
+        let twist = model.twist(segment.rate_at(measurement.after, measurement.t_s));
+        // A late measurement is of where the instrument was.
+        let across = Complex::new(0.0, twist.omega_rad_s) * near;
+        let by_latency = -(turn + 1.0) * (across + twist.v_m_s);
+        samples.push([seen, path, turn, Complex::<f64>::i() * turn, left, right, separation, by_latency]);
         let is_whole = turned_rad > TAU || gone_m > MAX_WINDOW_SEPARATIONS * model.separation_m;
         if is_whole && samples.len() >= MIN_WINDOW_POSITIONS {
             found.push(Window::of(&samples));
@@ -231,10 +241,9 @@ impl Cost {
                 sum.curvature -= across * across.transpose() * (2.0 / length);
             }
         }
-        // A drive is as stated, but for what the windows show.
-        let precision = sum.value / f64::max(count, 1.0) / (DRIVE_PRIOR_SIGMA * DRIVE_PRIOR_SIGMA);
-        for row in 2..PARAMETERS {
-            sum.bound[(row, row)] += precision;
+        let variance = sum.value / f64::max(count, 1.0);
+        for (row, sigma) in PRIOR_SIGMAS.into_iter().enumerate() {
+            sum.bound[(2 + row, 2 + row)] += variance / (sigma * sigma);
         }
         sum.curvature += sum.bound;
         sum
@@ -262,7 +271,7 @@ fn starts(windows: &[Window]) -> impl Iterator<Item = Values> {
     let distance_m = if turns > 0.0 { longer / turns } else { 0.0 };
     let round = (0..SENSOR_POSITION_STARTS).map(move |number| {
         let (sin, cos) = sin_cos(TAU * f64::from(number) / f64::from(SENSOR_POSITION_STARTS));
-        Values::from_row_slice(&[distance_m * cos, distance_m * sin, 0.0, 0.0, 0.0])
+        Values::from_row_slice(&[distance_m * cos, distance_m * sin, 0.0, 0.0, 0.0, 0.0])
     });
     round.chain([Values::zeros()])
 }
