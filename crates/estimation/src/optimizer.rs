@@ -194,7 +194,8 @@ pub(crate) fn fit_from(
     // Whether the last step hardly changed the likelihood: a variance near 0 may wander on for ever.
     let mut is_near = false;
     let mut progress = Progress::default();
-    for _ in 0..options.max_steps {
+    for step in 0..options.max_steps {
+        damping.only_shorter = 2 * step >= options.max_steps;
         let by_cached = PassOptions { keep: keep && cached.is_none(), by: cached.as_ref(), ..pass_options };
         let mut found = pass(records, selections, &model, &noise, &headings, terms, by_cached);
         let mean = MeanStep::of(&found, options, &basis)?;
@@ -202,7 +203,10 @@ pub(crate) fn fit_from(
             if options.noise_fixed { NoiseStep::none() } else { NoiseStep::of(&noise, &found, prior, basis.ncols()) };
         let columns = options.columns.len();
         let damped = damping.damped(of_noise.by);
-        let own = if acceleration.engages(StepSize { mean: mean.squared, noise: of_noise.by.amax() }) {
+        let noise_step = if damping.only_shorter { damped.amax() } else { of_noise.by.amax() };
+        let own = if !damping.only_shorter
+            && acceleration.engages(StepSize { mean: mean.squared, noise: of_noise.by.amax() })
+        {
             let proposed = stacked(&mean.by, &of_noise.by);
             let by = acceleration.mixed(&proposed, &block_diagonal(&mean.information, &of_noise.information));
             let by_noise = Vector4::from_fn(|k, _| by[columns + k]);
@@ -221,7 +225,7 @@ pub(crate) fn fit_from(
         let mean_settled = if confirms { CONFIRMING_STEP_TOLERANCE } else { MEAN_STEP_TOLERANCE };
         is_near = moved < MEAN_COST_TOLERANCE && of_noise.squared() < NOISE_COST_TOLERANCE;
         let settles = match options.ends {
-            ConvergenceCriterion::NoiseShare(share) => moved < mean_settled && of_noise.by.amax() < share,
+            ConvergenceCriterion::NoiseShare(share) => moved < mean_settled && noise_step < share,
             ConvergenceCriterion::Likelihood => is_near,
         };
         if settles && (cached.is_none() || moved_since_cached < REUSE_TOLERANCE) {

@@ -31,11 +31,14 @@ impl Progress {
 pub(crate) struct StepDamping {
     last: Vector4<f64>,
     share: Vector4<f64>,
+    /// Shares grow no more: steps go to and fro for ever where a measurement is an outlier by one variance
+    /// and none by the next, and what they enclose is the result.
+    pub(crate) only_shorter: bool,
 }
 
 impl Default for StepDamping {
     fn default() -> Self {
-        Self { last: Vector4::zeros(), share: Vector4::repeat(1.0) }
+        Self { last: Vector4::zeros(), share: Vector4::repeat(1.0), only_shorter: false }
     }
 }
 
@@ -45,6 +48,8 @@ impl StepDamping {
         for k in 0..step.len() {
             self.share[k] = if step[k] * self.last[k] < 0.0 {
                 STEP_DECREASE * self.share[k]
+            } else if self.only_shorter {
+                self.share[k]
             } else {
                 (STEP_INCREASE * self.share[k]).min(1.0)
             };
