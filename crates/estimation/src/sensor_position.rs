@@ -8,8 +8,8 @@
 //! take: m = q + (e^{iφ} − 1) l + Σ p ∂q/∂p, with the path q and the turn φ of dead reckoning from the
 //! window's start, the instrument's place l, and corrections p of the drive and the instrument's clock. Of
 //! the best rotation θ of each window (Umeyama 1991, in the plane) the cost is a function of x = (l, p)
-//! alone, J(x) = Σ |r|² + |m|² − 2 |Σ r m̄|, which Newton's method minimises from several places. The drive is
-//! corrected, and its paths are found anew.
+//! alone, J(x) = Σ |r|² + |m|² − 2 |Σ r m̄|, which Newton's method minimises from several places. The drive
+//! is corrected, and its paths are found anew.
 
 use std::f64::consts::TAU;
 
