@@ -27,7 +27,7 @@ use crate::products::{HeadingResponse, Products};
 use crate::propagation::{CachedPropagation, CarriedState, PropagationSource, SegmentCache};
 use crate::records::Records;
 use crate::segment::{Segment, Start};
-use crate::settings::MIN_PARALLEL_WORK;
+use crate::settings::{MIN_PARALLEL_WORK, MIN_RESTRICTED_SHARE};
 use crate::thinning::{PropagationInterval, Selection};
 
 /// The result of a pass.
@@ -83,8 +83,12 @@ impl Pass {
     /// variances: ½ tr S⁻¹ ∂S/∂ln σ² of each counts by the share of the measurements that is not taken up.
     pub(crate) fn restricted_noise_score(&self, parameters: usize) -> Vector4<f64> {
         let (measured, fitted) = self.measured_and_fitted(parameters);
+        // Of many measurements the share is below what is known of the noise. Where some are rejected the
+        // noise would grow without end.
+        let share = (fitted / measured).min(1.0);
+        let taken = if self.outliers.is_empty() && share > MIN_RESTRICTED_SHARE { share } else { 0.0 };
         // The rows of the information add up to the traces, as the variances do to S.
-        self.noise.gradient - self.noise.information * Vector4::repeat((fitted / measured).min(1.0))
+        self.noise.gradient - self.noise.information * Vector4::repeat(taken)
     }
 
     /// How many numbers were measured, and how many are fitted to them beside so many parameters: start

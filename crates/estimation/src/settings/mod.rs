@@ -214,6 +214,10 @@ pub(crate) const TIMING_NOISE_TOLERANCE: f64 = 0.05;
 /// Tuned: by hand; no record of what on.
 pub(crate) const RESTART_AFTER_OUTLIERS: u32 = 2;
 
+/// Share of the measured numbers that is fitted, from which on it is taken to take up a part of the scatter.
+/// Budgeted: of ten numbers a parameter the noise is known to a quarter, and a twentieth is left out.
+pub(crate) const MIN_RESTRICTED_SHARE: f64 = 0.1;
+
 /// Factor by which nuisances must reduce the number of outliers to explain them.
 /// Tuned: by hand; no record of what on.
 pub(crate) const MIN_OUTLIER_REDUCTION: usize = 2;
