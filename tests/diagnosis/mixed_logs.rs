@@ -11,9 +11,9 @@ use rayon::prelude::*;
 use statrs::distribution::{Binomial, DiscreteCDF};
 
 use crate::calibrated_ordinary_logs::calibrated;
-use crate::ordinary_kinds::robots;
+use crate::ordinary_kinds::{mount, robots};
 use crate::ordinary_logs::{diagnosed_in, shown_or_error};
-use crate::plain_robot::{Draws, Event, PlainRobot, Records, Reports, Stamps};
+use crate::plain_robot::{Draws, PlainRobot, Records, Reports, Stamps};
 
 /// A robot, what is not ordinary about its log, and the names that are right because of it.
 struct Mixed {
@@ -220,12 +220,12 @@ impl Mixed {
             }
             7 => {
                 let at = [sign * self.robot.scale * chance.between(3e-3, 0.1), 0.02 * self.robot.scale, 0.0];
-                self.robot.events = (0..21).map(|run| (run, Event::OtherMarker { at })).collect();
+                mount(&mut self.robot, at);
                 ("truth_lever_arm", at[0])
             }
             _ => {
                 let rad = sign * chance.between(0.01, 0.3);
-                self.robot.events = (0..21).map(|run| (run, Event::OtherMarker { at: [0.0, 0.0, rad] })).collect();
+                mount(&mut self.robot, [0.0, 0.0, rad]);
                 ("truth_yaw", rad)
             }
         };

@@ -390,7 +390,7 @@ const KINDS: &[(&str, Change, &[&str])] = &[
 ];
 
 /// The marker stands at this place of the robot in every run, metres and radians.
-fn mount(robot: &mut PlainRobot, at: [f64; 3]) {
+pub(crate) fn mount(robot: &mut PlainRobot, at: [f64; 3]) {
     robot.events = (0..21).map(|run| (run, Event::OtherMarker { at })).collect();
 }
 

@@ -18,9 +18,9 @@ use crate::settings::{
 };
 
 /// Puts counts in place of recorded angles, where these are a whole number of the stated counts but for their
-/// rounding, and of rates, where these are one in a sampling period, or in the time since the row before.
-/// Where a few rates are not, or rows are missing, of which nobody knows the counts, the rates of the others
-/// are put right. What a robot's runs say together decides.
+/// rounding, and of rates, where these are one in a sampling period, in the mean time between rows, or in the
+/// time since the row before. Where a few rates are not, or rows are missing, of which nobody knows the
+/// counts, the rates of the others are put right. What a robot's runs say together decides.
 pub(crate) fn restore(runs: &mut [Run], robot: &NominalRobot) {
     fn restored<C: Counted>(runs: &mut [Run], of: impl Fn(&Run) -> Option<C>) -> bool {
         let found: Vec<Option<C>> = runs.iter().map(of).collect();

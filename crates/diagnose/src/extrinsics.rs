@@ -9,8 +9,8 @@ use nalgebra::DVector;
 use crate::augmented_model::AugmentedModel;
 use crate::candidate::{Candidate, mean_terms, terms};
 use crate::cause::{Basis, Cause};
-use crate::finding::{Finding, of_causes, parameters};
-use crate::settings::levels::{MIN_QUANTILE_P_VALUE, SCAN_LEVEL};
+use crate::finding::{Finding, of_causes, parameters, z};
+use crate::settings::levels::SCAN_LEVEL;
 use crate::statistics::p_of_chi_square;
 
 /// The columns of a base fit that are a part of the extrinsics; none where these stay nominal.
@@ -55,10 +55,8 @@ pub(crate) fn of_model(model: &AugmentedModel<'_>, without: &[String]) -> Vec<Fi
         let cause = if is_named { candidate.cause() } else { Cause::Unknown };
         let estimates: Vec<(f64, f64)> =
             values.iter().zip(&rows).map(|(value, row)| (*value, covariance[(*row, *row)].sqrt())).collect();
-        let basis = Basis::Extrinsics;
-        let found = of_causes(vec![cause], p_value, parameters(&candidate, &estimates), basis);
-        let z = if p_value > MIN_QUANTILE_P_VALUE { found.z } else { chi_square.sqrt() };
-        (p_value < SCAN_LEVEL).then_some(Finding { z, ..found })
+        let found = of_causes(vec![cause], p_value, parameters(&candidate, &estimates), Basis::Extrinsics);
+        (p_value < SCAN_LEVEL).then_some(Finding { z: z(chi_square, p_value), ..found })
     };
     mean_terms(&[]).into_iter().filter_map(of_candidate).collect()
 }

@@ -142,7 +142,7 @@ fn trials(found: &SearchResult<'_>, candidate: &Candidate) -> usize {
 /// Whether an effect that a search found is of low significance.
 pub(crate) fn is_of_low_significance(found: &SearchResult<'_>, index: usize) -> bool {
     let (candidate, test) = (&found.model.candidates[index], &found.tests[index]);
-    z(test, sidak(test.p_value, trials(found, candidate))) < LOW_SIGNIFICANCE_SIGMAS
+    z(test.statistic, sidak(test.p_value, trials(found, candidate))) < LOW_SIGNIFICANCE_SIGMAS
 }
 
 /// The log of that probability over that of a catalogued cause.
@@ -164,7 +164,7 @@ fn of_candidate(candidate: &Candidate, names: &[Name], test: &Test, trials: usiz
     Finding {
         causes,
         probability: (1.0 - UNCATALOGUED_PRIOR) * if total_odds > 0.0 { 1.0 / total_odds } else { 1.0 },
-        z: z(test, p_value),
+        z: z(test.statistic, p_value),
         p_value,
         parameters: parameters(candidate, &test.estimates),
         basis: Basis::Mean,
@@ -177,8 +177,8 @@ fn of_candidate(candidate: &Candidate, names: &[Name], test: &Test, trials: usiz
 
 /// The standard normal quantile of a probability; where that is below what a double holds, from the
 /// statistic itself.
-fn z(test: &Test, p_value: f64) -> f64 {
-    if p_value > MIN_QUANTILE_P_VALUE { z_of_p(p_value) } else { test.statistic.sqrt() }
+pub(crate) fn z(statistic: f64, p_value: f64) -> f64 {
+    if p_value > MIN_QUANTILE_P_VALUE { z_of_p(p_value) } else { statistic.sqrt() }
 }
 
 /// The finding of a sparse term at the end of a model's candidates.
@@ -189,7 +189,7 @@ pub(crate) fn of_sparse(candidate: &Candidate, test: &Test, p_value: f64, trials
     Some(Finding {
         causes: vec![cause],
         probability: 1.0,
-        z: z(test, p_value),
+        z: z(test.statistic, p_value),
         p_value,
         parameters: BTreeMap::new(),
         basis: Basis::Products(trials),
@@ -377,7 +377,7 @@ pub(crate) fn of_drift(drift: &ClockDrift, without: &[String]) -> Finding {
 pub(crate) fn of_stamps(error: &StampError) -> Finding {
     let (p_value, values) = (error.test.p_value, parameters(&error.candidate, &error.test.estimates));
     let found = of_causes(vec![error.candidate.cause()], p_value, values, Basis::Mean);
-    Finding { z: z(&error.test, p_value), ..found }
+    Finding { z: z(error.test.statistic, p_value), ..found }
 }
 
 /// Adds what was taken off the clock before the fit to what was found of it after, which is as significant as

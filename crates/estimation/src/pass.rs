@@ -103,7 +103,7 @@ impl Pass {
     /// Whether so many parameters explain all that was measured, so that no scatter shows.
     pub(crate) fn shows_no_scatter(&self, parameters: usize) -> bool {
         let (measured, fitted) = self.measured_and_fitted(parameters);
-        // Outliers are taken in part where measurements are thinned.
+        // Numbers are means over phases.
         measured < fitted + 0.5
     }
 

@@ -31,7 +31,7 @@ use crate::settings::{
 const PARAMETERS: usize = 2 + Column::GEOMETRY.len() + 1;
 
 /// By how much a step moves what is no place of the instrument where the windows say nothing of it.
-const PRIOR_SIGMAS: [f64; PARAMETERS - 2] =
+const DAMPING_SIGMAS: [f64; PARAMETERS - 2] =
     [DRIVE_PRIOR_SIGMA, DRIVE_PRIOR_SIGMA, DRIVE_PRIOR_SIGMA, LATENCY_PRIOR_SIGMA_S];
 
 type Values = SVector<f64, PARAMETERS>;
@@ -242,7 +242,7 @@ impl Cost {
             }
         }
         let variance = sum.value / f64::max(count, 1.0);
-        for (row, sigma) in PRIOR_SIGMAS.into_iter().enumerate() {
+        for (row, sigma) in DAMPING_SIGMAS.into_iter().enumerate() {
             sum.bound[(2 + row, 2 + row)] += variance / (sigma * sigma);
         }
         sum.curvature += sum.bound;

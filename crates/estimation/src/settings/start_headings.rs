@@ -23,19 +23,19 @@ pub(crate) const MAX_WINDOW_SEPARATIONS: f64 = 20.0;
 
 /// Gain in squared standard deviations of a position from which on the instrument stands elsewhere than at
 /// the centre before the first fit.
-/// Derived: 10 standard errors; below it a spin's heading hardly depends on the place, and the place joins as
-/// the other parameters of the instrument do.
+/// Derived: 10 standard errors; below it a spin's heading hardly depends on the place, which stays at the
+/// centre.
 pub(crate) const MIN_SENSOR_POSITION_CHI_SQUARE: f64 = 100.0;
 
 /// Directions from the centre at which the search for the instrument's place starts.
 /// Derived: one is within half of an eighth of a turn.
 pub(crate) const SENSOR_POSITION_STARTS: u32 = 8;
 
-/// Most steps of the search from a start, and the relative step that ends it.
+/// Most steps of the search from a start.
 /// Budgeted: Newton's steps double the digits; a step takes a microsecond a window.
 pub(crate) const SENSOR_POSITION_STEPS: usize = 200;
 
-/// See [`SENSOR_POSITION_STEPS`].
+/// Relative step that ends the search.
 /// Budgeted: the fit that follows starts there.
 pub(crate) const SENSOR_POSITION_TOLERANCE: f64 = 1e-6;
 
