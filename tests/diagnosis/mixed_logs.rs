@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use statrs::distribution::{Binomial, DiscreteCDF};
 
 use crate::calibrated_ordinary_logs::calibrated;
-use crate::ordinary_kinds::{mount, robots};
+use crate::ordinary_kinds::{robots, set_extrinsics};
 use crate::ordinary_logs::{diagnosed_in, shown_or_error};
 use crate::plain_robot::{Draws, PlainRobot, Records, Reports, Stamps};
 
@@ -220,12 +220,12 @@ impl Mixed {
             }
             7 => {
                 let at = [sign * self.robot.scale * chance.between(3e-3, 0.1), 0.02 * self.robot.scale, 0.0];
-                mount(&mut self.robot, at);
+                set_extrinsics(&mut self.robot, at);
                 ("truth_lever_arm", at[0])
             }
             _ => {
                 let rad = sign * chance.between(0.01, 0.3);
-                mount(&mut self.robot, [0.0, 0.0, rad]);
+                set_extrinsics(&mut self.robot, [0.0, 0.0, rad]);
                 ("truth_yaw", rad)
             }
         };

@@ -342,7 +342,7 @@ const KINDS: &[(&str, Change, &[&str])] = &[
         "positions of a marker 5 cm ahead",
         |of| {
             of.reports = Reports::Positions;
-            mount(of, [0.05, 0.0, 0.0]);
+            set_extrinsics(of, [0.05, 0.0, 0.0]);
         },
         &["truth_lever_arm"],
     ),
@@ -350,7 +350,7 @@ const KINDS: &[(&str, Change, &[&str])] = &[
         "positions of a marker 15 cm behind and 10 cm to the left",
         |of| {
             of.reports = Reports::Positions;
-            mount(of, [-0.15, 0.1, 0.0]);
+            set_extrinsics(of, [-0.15, 0.1, 0.0]);
         },
         &["truth_lever_arm"],
     ),
@@ -358,7 +358,7 @@ const KINDS: &[(&str, Change, &[&str])] = &[
         "positions of 15 mm at 5 Hz, of an antenna 30 cm ahead",
         |of| {
             (of.reports, of.truth_sigma_m, of.truth_hz) = (Reports::Positions, 1.5e-2, 5.0);
-            mount(of, [0.3, 0.0, 0.0]);
+            set_extrinsics(of, [0.3, 0.0, 0.0]);
         },
         &["truth_lever_arm"],
     ),
@@ -367,7 +367,7 @@ const KINDS: &[(&str, Change, &[&str])] = &[
         |of| {
             (of.reports, of.truth_sigma_m, of.truth_hz) = (Reports::Positions, 1.5e-2, 5.0);
             (of.only, of.runs) = (Some("free"), 8);
-            mount(of, [0.3, 0.0, 0.0]);
+            set_extrinsics(of, [0.3, 0.0, 0.0]);
         },
         &["truth_lever_arm"],
     ),
@@ -375,7 +375,7 @@ const KINDS: &[(&str, Change, &[&str])] = &[
         "poses 100 ms late, of a marker turned by 0.19 rad",
         |of| {
             of.latency_s = 0.1;
-            mount(of, [0.0, 0.0, 0.19]);
+            set_extrinsics(of, [0.0, 0.0, 0.19]);
         },
         &["truth_latency", "truth_yaw"],
     ),
@@ -383,14 +383,14 @@ const KINDS: &[(&str, Change, &[&str])] = &[
         "positions of a marker 15 cm behind, one long log",
         |of| {
             (of.reports, of.joined) = (Reports::Positions, true);
-            mount(of, [-0.15, 0.0, 0.0]);
+            set_extrinsics(of, [-0.15, 0.0, 0.0]);
         },
         &["truth_lever_arm"],
     ),
 ];
 
-/// The marker stands at this place of the robot in every run, metres and radians.
-pub(crate) fn mount(robot: &mut PlainRobot, at: [f64; 3]) {
+/// The extrinsics of the marker in every run, metres and radians.
+pub(crate) fn set_extrinsics(robot: &mut PlainRobot, at: [f64; 3]) {
     robot.events = (0..21).map(|run| (run, Event::OtherMarker { at })).collect();
 }
 

@@ -1,14 +1,14 @@
 //! Where an instrument that measures positions alone stands on the robot, before the first fit.
 //!
-//! Without headings the place of the instrument and the headings at which the runs start are found together
-//! or not at all: a spin is a circle about the drive's centre, of which the start heading is any where the
-//! instrument is taken to be at the centre. A fit that begins there stays in a minimum of its own.
+//! Without headings the position of the instrument and the headings at which the runs start are found
+//! together or not at all: a spin is a circle about the drive's centre, of which the start heading is any
+//! where the instrument is taken to be at the centre. A fit that begins there stays in a minimum of its own.
 //!
-//! In the complex plane, positions r of a window are at e^{iθ} m but for the window's place, which the means
-//! take: m = q + (e^{iφ} − 1) l + Σ p ∂q/∂p, with the path q and the turn φ of dead reckoning from the
-//! window's start, the instrument's place l, and corrections p of the drive and the instrument's clock. Of
+//! In the complex plane, positions r of a window are at e^{iθ} m but for the window's translation, which the
+//! means take: m = q + (e^{iφ} − 1) l + Σ p ∂q/∂p, with the path q and the turn φ of dead reckoning from the
+//! window's start, the instrument's position l, and corrections p of the drive and the instrument's clock. Of
 //! the best rotation θ of each window (Umeyama 1991, in the plane) the cost is a function of x = (l, p)
-//! alone, J(x) = Σ |r|² + |m|² − 2 |Σ r m̄|, which Newton's method minimises from several places. The drive
+//! alone, J(x) = Σ |r|² + |m|² − 2 |Σ r m̄|, which Newton's method minimises from several starts. The drive
 //! is corrected, and its paths are found anew.
 
 use std::f64::consts::TAU;
@@ -25,12 +25,12 @@ use crate::settings::{
     SENSOR_POSITION_TOLERANCE,
 };
 
-/// Place of the instrument ahead of the drive's centre and to the left, metres, relative corrections of the
-/// drive's geometry, and the latency, seconds: of a robot that drives steadily it is a place behind the
-/// centre.
+/// Position of the instrument ahead of the drive's centre and to the left, metres, relative corrections of
+/// the drive's geometry, and the latency, seconds: of a robot that drives steadily it is a position behind
+/// the centre.
 const PARAMETERS: usize = 2 + Column::GEOMETRY.len() + 1;
 
-/// By how much a step moves what is no place of the instrument where the windows say nothing of it.
+/// By how much a step moves what is no position of the instrument where the windows say nothing of it.
 const DAMPING_SIGMAS: [f64; PARAMETERS - 2] =
     [DRIVE_PRIOR_SIGMA, DRIVE_PRIOR_SIGMA, DRIVE_PRIOR_SIGMA, LATENCY_PRIOR_SIGMA_S];
 
@@ -46,31 +46,31 @@ impl Records<'_> {
         };
         let of_nominal = windows(nominal, Complex::default());
         let at_start: Vec<Values> = starts(&of_nominal).collect();
-        let centre = Place::found(&windows, nominal, of_nominal.clone(), &[Values::zeros()], Free::Others)?;
-        let place = Place::found(&windows, nominal, of_nominal, &at_start, Free::All)?;
-        let gain = centre.cost - place.cost;
-        (gain > MIN_SENSOR_POSITION_CHI_SQUARE * place.variance()?).then_some(place.position_m)
+        let centre = PositionFit::found(&windows, nominal, of_nominal.clone(), &[Values::zeros()], Free::Others)?;
+        let found = PositionFit::found(&windows, nominal, of_nominal, &at_start, Free::All)?;
+        let gain = centre.cost - found.cost;
+        (gain > MIN_SENSOR_POSITION_CHI_SQUARE * found.variance()?).then_some(found.position_m)
     }
 }
 
 /// What moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Free {
-    /// The instrument's place and what is beside it.
+    /// The instrument's position and what is beside it.
     All,
     /// What is beside it.
     Others,
 }
 
 /// A minimum of the cost.
-struct Place {
+struct PositionFit {
     position_m: [f64; 2],
     cost: f64,
     /// Coordinates, less what was fitted.
     freedom: f64,
 }
 
-impl Place {
+impl PositionFit {
     /// The lowest minimum from some starts, `of_nominal` being the windows by the nominal drive.
     fn found(
         windows: &impl Fn(&Model, Complex<f64>) -> Vec<Window>,
@@ -120,7 +120,7 @@ struct Window {
     measured_by_path: Complex<f64>,
     /// Σ r d̄.
     measured_by: SVector<Complex<f64>, PARAMETERS>,
-    /// Coordinates, less the place and the rotation.
+    /// Coordinates, less the translation and the rotation.
     freedom: f64,
 }
 
@@ -128,7 +128,7 @@ struct Window {
 type Sample = [Complex<f64>; 2 + PARAMETERS];
 
 /// Windows of a segment, each until the robot has turned once, or has gone so far that its dead reckoning
-/// drifts. Derivatives are those of an instrument near a place.
+/// drifts. Derivatives are those of an instrument near a position.
 fn windows(segment: &Segment<'_>, model: &Model, near: Complex<f64>) -> Vec<Window> {
     let moved = Column::GEOMETRY.map(|column| {
         let mut moved = model.clone();
@@ -137,12 +137,12 @@ fn windows(segment: &Segment<'_>, model: &Model, near: Complex<f64>) -> Vec<Wind
     });
     let mut found = Vec::new();
     let (mut pose, mut moved_poses) = (Pose::IDENTITY, moved.each_ref().map(|_| Pose::IDENTITY));
-    let (mut turned_rad, mut gone_m, mut at) = (0.0, 0.0, 0);
+    let (mut turned_rad, mut distance_m, mut at) = (0.0, 0.0, 0);
     let mut samples: Vec<Sample> = Vec::new();
     for measurement in &segment.measurements {
         if samples.is_empty() {
             (pose, moved_poses) = (Pose::IDENTITY, moved_poses.map(|_| Pose::IDENTITY));
-            (turned_rad, gone_m, at) = (0.0, 0.0, measurement.after);
+            (turned_rad, distance_m, at) = (0.0, 0.0, measurement.after);
         }
         for interval in &segment.intervals[at..measurement.after] {
             let increment = model.increment(interval.wheel_rad);
@@ -151,7 +151,7 @@ fn windows(segment: &Segment<'_>, model: &Model, near: Complex<f64>) -> Vec<Wind
                 *pose = *pose * model.increment(interval.wheel_rad).arc();
             }
             turned_rad += increment.turn_rad.abs();
-            gone_m += increment.distance_m.abs();
+            distance_m += increment.distance_m.abs();
         }
         at = measurement.after;
         let (path, turn) = path_and_turn(pose);
@@ -159,13 +159,13 @@ fn windows(segment: &Segment<'_>, model: &Model, near: Complex<f64>) -> Vec<Wind
             let (moved, turned) = path_and_turn(moved);
             (moved - path + (turned - turn) * near).unscale(DRIVE_STEP)
         });
-        let seen = Complex::new(measurement.x_m, measurement.y_m);
+        let measured = Complex::new(measurement.x_m, measurement.y_m);
         let twist = model.twist(segment.rate_at(measurement.after, measurement.t_s));
         // A late measurement is of where the instrument was.
         let across = Complex::new(0.0, twist.omega_rad_s) * near;
         let by_latency = -(turn + 1.0) * (across + twist.v_m_s);
-        samples.push([seen, path, turn, Complex::<f64>::i() * turn, left, right, separation, by_latency]);
-        let is_whole = turned_rad > TAU || gone_m > MAX_WINDOW_SEPARATIONS * model.separation_m;
+        samples.push([measured, path, turn, Complex::<f64>::i() * turn, left, right, separation, by_latency]);
+        let is_whole = turned_rad > TAU || distance_m > MAX_WINDOW_SEPARATIONS * model.separation_m;
         if is_whole && samples.len() >= MIN_WINDOW_POSITIONS {
             found.push(Window::of(&samples));
             samples.clear();
@@ -263,7 +263,7 @@ impl Cost {
     }
 }
 
-/// The centre, and places all round it at the distance that the measured paths of turns tell.
+/// The centre, and positions all round it at the distance that the measured paths of turns tell.
 fn starts(windows: &[Window]) -> impl Iterator<Item = Values> {
     let (turns, longer) = windows.iter().fold((0.0, 0.0), |(turns, longer), window| {
         (turns + window.products[(0, 0)], longer + window.measured_by[0].norm())

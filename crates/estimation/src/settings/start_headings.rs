@@ -14,7 +14,7 @@ pub(crate) const HEADING_STEP_TOLERANCE_RAD: f64 = 1e-6;
 pub(crate) const START_HEADING_PRECISION: f64 = 2.0;
 
 /// Fewest positions of a window whose rotation is found.
-/// Derived: two and a rotation tell nothing of the instrument's place; one more than three.
+/// Derived: two and a rotation tell nothing of the instrument's position; one more than three.
 pub(crate) const MIN_WINDOW_POSITIONS: usize = 4;
 
 /// Longest way of such a window, in wheel separations.
@@ -23,11 +23,11 @@ pub(crate) const MAX_WINDOW_SEPARATIONS: f64 = 20.0;
 
 /// Gain in squared standard deviations of a position from which on the instrument stands elsewhere than at
 /// the centre before the first fit.
-/// Derived: 10 standard errors; below it a spin's heading hardly depends on the place, which stays at the
+/// Derived: 10 standard errors; below it a spin's heading hardly depends on the position, which stays at the
 /// centre.
 pub(crate) const MIN_SENSOR_POSITION_CHI_SQUARE: f64 = 100.0;
 
-/// Directions from the centre at which the search for the instrument's place starts.
+/// Directions from the centre at which the search for the instrument's position starts.
 /// Derived: one is within half of an eighth of a turn.
 pub(crate) const SENSOR_POSITION_STARTS: u32 = 8;
 

@@ -1,4 +1,4 @@
-//! The place of an instrument of positions alone, by hand-made runs.
+//! The position of an instrument of positions alone, by hand-made runs.
 
 use dataset::{Dataset, TruthSample, WheelLog};
 use kinematics::{Increment, Pose, Wheels};
@@ -45,24 +45,24 @@ fn found(dataset: &Dataset) -> Option<[f64; 2]> {
 /// A fit starts there: what two corrections leave of the drive's 1 % times the distance is less than a
 /// thousandth of it.
 #[test]
-fn the_place_is_found_on_every_side_though_the_drive_is_a_per_cent_off() {
+fn the_position_is_found_on_every_side_though_the_drive_is_a_per_cent_off() {
     for (x_m, y_m) in [(0.15, 0.0), (-0.15, 0.1), (0.0, -0.3), (0.02, 0.03), (-1.0, 0.5)] {
         let at = found(&measured(Pose::new(x_m, y_m, 0.4), 0.0)).expect("it is elsewhere");
         assert!((at[0] - x_m).hypot(at[1] - y_m) < 1e-3 * x_m.hypot(y_m), "{at:?} for {x_m} {y_m}");
     }
 }
 
-/// Sixty positions of 5 mm in two turns tell the place to some millimetres beside a drive that is not known;
-/// what is near the centre is no place of its own.
+/// Sixty positions of 5 mm in two turns tell the position to some millimetres beside a drive that is not
+/// known; what is near the centre is at the centre.
 #[test]
-fn the_centre_is_no_place_of_its_own() {
+fn what_is_near_the_centre_is_at_the_centre() {
     let at = found(&measured(Pose::new(0.1, -0.1, 0.0), 5e-3)).expect("it is elsewhere");
     assert!((at[0] - 0.1).hypot(at[1] + 0.1) < 1e-2, "{at:?}");
     assert_eq!(found(&measured(Pose::IDENTITY, 5e-3)), None);
     assert_eq!(found(&measured(Pose::new(1e-3, 0.0, 0.0), 5e-3)), None);
 }
 
-/// Straights alone do not tell the place, and measured headings tell it otherwise.
+/// Straights alone do not tell the position, and measured headings tell it otherwise.
 #[test]
 fn nothing_is_found_where_nothing_turns_or_headings_are_measured() {
     let mut straight = measured(Pose::new(0.3, 0.1, 0.0), 1e-3);
