@@ -91,7 +91,7 @@ impl CountedAngles {
         let WheelLog::Angles(angles) = &run.odometry.wheels else { return None };
         let rad_per_count = TAU / robot.ticks_per_rev?;
         // Those of a row and of the first.
-        let rounded = run.odometry.wheels.recorded_step().unwrap_or(0.0) / rad_per_count;
+        let rounded = run.odometry.wheels.decimal_step().unwrap_or(0.0) / rad_per_count;
         let first = Wheels { left: *angles.left.first()?, right: *angles.right.first()? };
         let of_row = |(left, right): (&f64, &f64)| {
             let since_first = Wheels { left: left - first.left, right: right - first.right };
@@ -137,7 +137,7 @@ impl CountedRates {
             WheelLog::Twist { .. } => 1.0 + 0.5 * geometry.wheel_separation_m(),
             WheelLog::Ticks(_) | WheelLog::Angles(_) => return None,
         };
-        let rounded_m_s = 0.5 * wheel_share * wheels.recorded_step().unwrap_or(0.0);
+        let rounded_m_s = 0.5 * wheel_share * wheels.decimal_step().unwrap_or(0.0);
         let m_per_count = geometry.m_per_rad().map(|m_per_rad| m_per_rad * TAU / ticks_per_rev);
         let t_s = &run.odometry.t_s;
         let since_s: Vec<f64> = t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -351,6 +351,27 @@ mod tests {
         let counts: Vec<i64> = (0..2000).map(|row| (at(row + 1) - at(1)) as i64).collect();
         assert!(of(500.0) == WheelLog::Ticks(Wheels::both(counts)), "counts");
         assert!(matches!(of(505.0), WheelLog::Speeds(_)), "another number of counts");
+    }
+
+    /// Speeds of 0 to 3 counts, 27.16 mm/s each, that are rounded to 27, 54 and 81 mm/s: too few for their
+    /// decimals to be those of rounding, unless they are counts.
+    #[test]
+    fn regress_rates_of_few_counts_are_the_counts() {
+        let m_per_count = 0.16 * std::f64::consts::PI / 1850.0;
+        let at = |row: u32| (f64::from(row) * 2.37).floor();
+        let of = |step_m_s: f64| {
+            let speeds: Vec<f64> = (0..2000).map(|row| (at(row + 1) - at(row)) * m_per_count / 0.01).collect();
+            let rounded = speeds.iter().map(|of| (of / step_m_s).round() * step_m_s).collect();
+            let t_s = (0..2000).map(|row| 0.01 * f64::from(row)).collect::<Vec<f64>>();
+            let wheels = WheelLog::Speeds(Wheels::both(rounded));
+            let mut run =
+                Run { odometry: Odometry { t_s: t_s.into(), wheels, ..Odometry::default() }, ..Run::default() };
+            restore(std::slice::from_mut(&mut run), &NominalRobot { ticks_per_rev: Some(1850.0), ..ROBOT });
+            run.odometry.wheels
+        };
+        let counts: Vec<i64> = (0..2000).map(|row| (at(row + 1) - at(1)) as i64).collect();
+        assert!(of(1e-3) == WheelLog::Ticks(Wheels::both(counts)), "counts");
+        assert!(matches!(of(2e-2), WheelLog::Speeds(_)), "a rounding of most of a count");
     }
 
     /// Two speeds again and again, of which one is a count, are what a robot was told to drive.

@@ -15,6 +15,16 @@ impl WheelLog {
     /// decimals than `MAX_DECIMALS`, and where they are so few that the robot may have driven at these.
     #[must_use]
     pub fn recorded_step(&self) -> Option<f64> {
+        let Decimals { per_unit, numbers } = self.decimals()?;
+        (numbers.len() >= MIN_DISTINCT_RATES).then(|| step_of(&numbers) as f64 / per_unit)
+    }
+
+    /// The same, however few the values are: of few, one in their last decimal.
+    pub(crate) fn decimal_step(&self) -> Option<f64> {
+        self.recorded_step().or_else(|| Some(1.0 / self.decimals()?.per_unit))
+    }
+
+    fn decimals(&self) -> Option<Decimals> {
         let columns = match self {
             Self::Angles(wheels) | Self::Speeds(wheels) => [&wheels.left, &wheels.right],
             Self::Twist { v_mps, omega_radps } => [v_mps, omega_radps],
@@ -25,13 +35,21 @@ impl WheelLog {
         let per_unit = (0..=MAX_DECIMALS)
             .map(|decimals| 10_f64.powi(decimals))
             .find(|of| values().all(|value| is_whole(value * of)))?;
-        let steps: BTreeSet<i64> = values().map(|value| (value * per_unit).round() as i64).collect();
-        if steps.len() < MIN_DISTINCT_RATES {
-            return None;
-        }
-        let multiple = [5, 2].into_iter().find(|multiple| steps.iter().all(|step| step % multiple == 0)).unwrap_or(1);
-        Some(multiple as f64 / per_unit)
+        Some(Decimals { per_unit, numbers: values().map(|value| (value * per_unit).round() as i64).collect() })
     }
+}
+
+/// Values that have few decimals.
+struct Decimals {
+    /// Of the last decimal, in one of the values' unit.
+    per_unit: f64,
+    /// The values, in their last decimal.
+    numbers: BTreeSet<i64>,
+}
+
+/// The largest of one, two and five that all are multiples of.
+fn step_of(numbers: &BTreeSet<i64>) -> i64 {
+    [5, 2].into_iter().find(|step| numbers.iter().all(|number| number % step == 0)).unwrap_or(1)
 }
 
 #[cfg(test)]
@@ -61,6 +79,7 @@ mod tests {
     fn values_that_are_not_rounded_or_few_and_counts_have_none() {
         assert_eq!(speeds(1e-7).recorded_step(), None);
         assert_eq!(speeds(0.5).recorded_step(), None, "two speeds forward and one back");
+        assert_eq!(speeds(0.5).decimal_step(), Some(0.1));
         let WheelLog::Speeds(Wheels { left, right }) = speeds(1e-2) else { panic!("speeds") };
         let counts: [Vec<i64>; 2] = [&left, &right].map(|of| of.iter().map(|speed| (100.0 * speed) as i64).collect());
         assert_eq!(WheelLog::Ticks(Wheels { left: counts[0].clone(), right: counts[1].clone() }).recorded_step(), None);
