@@ -371,6 +371,14 @@ const KINDS: &[(&str, Change, &[&str])] = &[
         },
         &["truth_lever_arm"],
     ),
+    ("poses 50 ms late", |of| of.latency_s = 0.05, &["truth_latency"]),
+    (
+        "poses 50 ms late, four squares",
+        |of| (of.latency_s, of.only, of.runs) = (0.05, Some("square"), 4),
+        &["truth_latency"],
+    ),
+    ("poses 50 ms late, one long log", |of| (of.latency_s, of.joined) = (0.05, true), &["truth_latency"]),
+    ("positions 50 ms late", |of| (of.latency_s, of.reports) = (0.05, Reports::Positions), &["truth_latency"]),
     (
         "poses 100 ms late, of a marker turned by 0.19 rad",
         |of| {

@@ -11,7 +11,8 @@ use crate::normal_equations::{NormalEquations, total};
 use crate::optimizer::Solution;
 use crate::pass_options::OutlierGate;
 use crate::settings::{
-    BLOCKS_PER_RUN, FOLDS, MIN_HELD_OUT_GAIN_SIGMA, MIN_OUTLIER_REDUCTION, MIN_RUNS_TO_HOLD_OUT, MIN_THINNING_REDUCTION,
+    BLOCKS_PER_RUN, FOLDS, MAX_END_GROWTH_RATIO, MIN_HELD_OUT_GAIN_SIGMA, MIN_OUTLIER_REDUCTION, MIN_RUNS_TO_HOLD_OUT,
+    MIN_THINNING_REDUCTION,
 };
 use crate::thinning::Thinning;
 
@@ -30,6 +31,18 @@ struct HeldOut {
     end_m: f64,
     /// The same of headings, radians.
     end_rad: f64,
+}
+
+impl HeldOut {
+    /// Are the ends of dead reckoning farther off than `base` has them? Positions or headings may be by a
+    /// little where the others come much nearer.
+    fn drifts_beside(&self, base: &Self) -> bool {
+        // Without headings their errors are 0 in both.
+        let growth = |from: f64, to: f64| if from == to { 0.0 } else { to / from - 1.0 };
+        let (position, heading) = (growth(base.end_m, self.end_m), growth(base.end_rad, self.end_rad));
+        let grows = |growth: f64, other: f64| growth > 0.0_f64.max(-MAX_END_GROWTH_RATIO * other);
+        grows(position, heading) || grows(heading, position)
+    }
 }
 
 /// A set of the instrument's columns that predicts held-out units.
@@ -63,8 +76,9 @@ fn mean_and_error(values: &[f64]) -> Option<(f64, f64)> {
 
 /// Adds extrinsics and latency, common to all or for each session or run, where they predict held-out units:
 /// the measurements by their likelihood, and the ends of the runs by dead reckoning. The second condition
-/// keeps out terms that lower the cost and worsen the calibration. What each run has for itself is fitted to
-/// some blocks of it and judged on the others.
+/// keeps out extrinsics that lower the cost and worsen the calibration; where robots come to rest, the ends
+/// say nothing of a latency. What each run has for itself is fitted to some blocks of it and judged on the
+/// others.
 pub(crate) fn add_nuisances(fit: &mut ModelFit<'_>, gate: OutlierGate) -> Result<(), EstimationError> {
     let sets = nuisance_sets(fit);
     let runs = &fit.solution.pass.runs;
@@ -93,7 +107,7 @@ pub(crate) fn add_nuisances(fit: &mut ModelFit<'_>, gate: OutlierGate) -> Result
             let before = of_grouping.as_ref().map_or(&base, |accepted| &accepted.held_out);
             let gains: Vec<f64> = before.costs.iter().zip(&found.costs).map(|(base, set)| base - set).collect();
             let Some((mean, error)) = mean_and_error(&gains) else { continue };
-            let drifts = found.end_m > base.end_m || found.end_rad > base.end_rad;
+            let drifts = set != &[Column::Latency] && found.drifts_beside(&base);
             if mean > MIN_HELD_OUT_GAIN_SIGMA * error && !drifts {
                 let gain = base.costs.iter().zip(&found.costs).map(|(base, set)| base - set).sum();
                 of_grouping = Some(AcceptedNuisances { gain, columns, own, held_out: found });
@@ -303,6 +317,18 @@ mod tests {
             hidden_directions(&fit)
         };
         assert_eq!((of(&driven), of(&standing)), (0, 3));
+    }
+
+    #[test]
+    fn ends_may_be_farther_off_where_the_others_come_much_nearer() {
+        let of = |end_m, end_rad| HeldOut { costs: Vec::new(), end_m, end_rad };
+        let drifts = |found: (f64, f64)| of(found.0, found.1).drifts_beside(&of(2.0, 1.0));
+        assert!(!drifts((2.0, 1.0)) && !drifts((1.0, 0.9)));
+        assert!(drifts((2.0, 1.001)) && drifts((2.001, 1.0)));
+        // Half of the one, and less or more than a twentieth of the other.
+        assert!(!drifts((1.0, 1.04)) && drifts((1.0, 1.06)) && !drifts((2.08, 0.5)) && drifts((2.12, 0.5)));
+        // Positions alone.
+        assert!(of(2.001, 0.0).drifts_beside(&of(2.0, 0.0)) && !of(2.0, 0.0).drifts_beside(&of(2.0, 0.0)));
     }
 
     #[test]
