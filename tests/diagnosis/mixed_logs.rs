@@ -298,6 +298,15 @@ fn regress_ends_of_two_squares_say_nothing_of_the_odometry() {
     assert!(found.is_err() && why.contains("too few"), "{why}");
 }
 
+/// A straight and a spin seen by positions alone: the fit did not converge, and a separation of 0.59 times
+/// the stated one was found with 21 standard deviations.
+#[test]
+fn regress_a_fit_that_did_not_converge_finds_nothing() {
+    let (folder, _) = Mixed::drawn(6266).robot.written();
+    let why = diagnosed_in(folder.path()).expect_err("no base");
+    assert!(why.contains("did not converge"), "{why}");
+}
+
 #[test]
 fn logs_that_differ_in_several_things_are_diagnosed_and_calibrated() {
     let (robots, first) = robots();

@@ -77,6 +77,11 @@ pub enum DiagnoseError {
         "the measurements are too few to say whether the odometry follows the robot; record more poses along the path, or more runs"
     )]
     TooFewMeasurements,
+    /// Neither the calibrated model nor one with effects converged: no number of either is a result.
+    #[error(
+        "the fit of the calibrated model did not converge: these runs hardly determine it; yair check says what they do not determine"
+    )]
+    NotConverged,
     /// There is no base fit.
     #[error("no calibrated model to ask: {0}")]
     NoFit(#[from] EstimationError),
@@ -280,6 +285,9 @@ fn stages(
     let share = rejected_share(&found.fit);
     if faults.is_empty() && share > MAX_REJECTED_FRACTION {
         return Err(DiagnoseError::OdometryUncorrelated { percent: 100.0 * share });
+    }
+    if !structure.base.solution.converged && !found.fit.solution.converged {
+        return Err(DiagnoseError::NotConverged);
     }
     let is_uncorrelated = !is_correlated(&found.fit, &found.candidates);
     // Stated lengths that are not determined, and are off, look like odometry that does not follow.

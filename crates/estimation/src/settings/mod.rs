@@ -6,6 +6,7 @@
 
 mod driving;
 mod map;
+mod nuisances;
 mod partial;
 mod poses_between_rows;
 mod recorded_rates;
@@ -16,6 +17,10 @@ mod wheel_rates;
 pub(crate) use driving::{CRUISE_QUANTILE, RISE_QUANTILE, RISE_SPEED_RATIOS};
 pub(crate) use map::{
     GOLDEN_ANGLE_RAD, MAP_CELLS_PER_LENGTH, MAP_WAVES, MAX_MAP_CELLS, MAX_MAP_FUNCTIONS, MAX_MAP_REMAINDER,
+};
+pub(crate) use nuisances::{
+    BLOCKS_PER_RUN, FOLDS, MAX_END_GROWTH_RATIO, MIN_HELD_OUT_GAIN_SIGMA, MIN_OUTLIER_REDUCTION, MIN_RUNS_TO_HOLD_OUT,
+    MIN_THINNING_REDUCTION,
 };
 pub(crate) use partial::{
     BIAS_WALK_RADPS, GYRO_BIAS_SIGMA_RADPS, GYRO_SCALE_SIGMA, GYRO_WINDOW_S, LIDAR_PLACE_SIGMA_M, MAX_SEPARATION_SHARE,
@@ -218,21 +223,6 @@ pub(crate) const RESTART_AFTER_OUTLIERS: u32 = 2;
 /// Budgeted: of ten numbers a parameter the noise is known to a quarter, and a twentieth is left out.
 pub(crate) const MIN_RESTRICTED_SHARE: f64 = 0.1;
 
-/// Factor by which nuisances must reduce the number of outliers to explain them.
-/// Tuned: by hand; no record of what on.
-pub(crate) const MIN_OUTLIER_REDUCTION: usize = 2;
-
-/// Growth of the errors of final headings, or of positions, that extrinsics are allowed for each share that
-/// those of the other fall by.
-/// Tuned: markers turned by 0.19 rad cut positions to a quarter and moved headings by up to 0.7 %; those of
-/// real robots that predict ends worse cut one by 4 % where the other grew by 2 %.
-pub(crate) const MAX_END_GROWTH_RATIO: f64 = 0.1;
-
-/// Factor by which nuisances must reduce the time between measurements whose errors are not autocorrelated.
-/// Tuned: on real robots, where millimetres and milliradians reduced it up to eightfold and ends were
-/// predicted worse with them, and on poses 0.1 s late of a marker turned by 0.2 rad, where it was 85.
-pub(crate) const MIN_THINNING_REDUCTION: f64 = 10.0;
-
 // Whiteness; thinning has a file of its own.
 
 /// Autocorrelation of the innovations, standard errors, below which they count as white.
@@ -263,24 +253,6 @@ pub(crate) const MAX_NOMINAL_DEVIATION: f64 = 3e-7;
 /// mean square (0.9 to 1.2 with 3), and the 95 % interval of the wheel separation of ten runs covers it in 84
 /// % (78 % with 3, 70 % by the information alone).
 pub(crate) const INFORMATION_WEIGHT_RUNS: f64 = 1.0;
-
-// Held-out runs.
-
-/// Fewer runs are cut into blocks to be held out.
-/// Derived: one run or block for each fold.
-pub(crate) const MIN_RUNS_TO_HOLD_OUT: usize = 6;
-
-/// Folds of cross-validation.
-/// Tuned: by hand; no record of what on.
-pub(crate) const FOLDS: usize = 6;
-
-/// Blocks of each run when each run has its own extrinsics: they are fitted to some and judged on the others.
-/// Tuned: by hand; no record of what on.
-pub(crate) const BLOCKS_PER_RUN: usize = 3;
-
-/// Gain in log-likelihood on held-out runs, standard errors, that lets a nuisance into the model.
-/// Convention: two standard errors, a one-sided level of 2.3 %.
-pub(crate) const MIN_HELD_OUT_GAIN_SIGMA: f64 = 2.0;
 
 // Gauss–Newton and Fisher scoring.
 
