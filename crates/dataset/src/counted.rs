@@ -331,6 +331,16 @@ mod tests {
         }
     }
 
+    /// What is made of speeds in steps of `step_m_s`, both wheels' the same, of a robot of so many counts.
+    fn restored(t_s: &[f64], speeds_m_s: &[f64], step_m_s: f64, ticks_per_rev: f64) -> WheelLog {
+        let rounded = speeds_m_s.iter().map(|of| (of / step_m_s).round() * step_m_s).collect();
+        let wheels = WheelLog::Speeds(Wheels::both(rounded));
+        let odometry = Odometry { t_s: t_s.to_vec().into(), wheels, ..Odometry::default() };
+        let mut run = Run { odometry, ..Run::default() };
+        restore(std::slice::from_mut(&mut run), &NominalRobot { ticks_per_rev: Some(ticks_per_rev), ..ROBOT });
+        run.odometry.wheels
+    }
+
     /// Rows that are more frequent than counts, with stamps that are off by half of what is between two:
     /// there are no counts but 0 and 1, and no beat.
     #[test]
@@ -339,37 +349,23 @@ mod tests {
         let off = |row: u32| 2.5e-3 * (f64::from(row * 7919 % 1000) / 1000.0 - 0.5);
         let t_s: Vec<f64> = (0..2000).map(|row| 0.005 * f64::from(row) + off(row)).collect();
         let at = |row: u32| (f64::from(row) * 0.37).floor();
-        let of = |ticks_per_rev: f64| {
-            let speeds: Vec<f64> = (0..2000).map(|row| (at(row + 1) - at(row)) * m_per_count / 0.005).collect();
-            let rounded = speeds.iter().map(|of| (of * 1e4).round() * 1e-4).collect();
-            let wheels = WheelLog::Speeds(Wheels::both(rounded));
-            let odometry = Odometry { t_s: t_s.clone().into(), wheels, ..Odometry::default() };
-            let mut run = Run { odometry, ..Run::default() };
-            restore(std::slice::from_mut(&mut run), &NominalRobot { ticks_per_rev: Some(ticks_per_rev), ..ROBOT });
-            run.odometry.wheels
-        };
+        let speeds: Vec<f64> = (0..2000).map(|row| (at(row + 1) - at(row)) * m_per_count / 0.005).collect();
         let counts: Vec<i64> = (0..2000).map(|row| (at(row + 1) - at(1)) as i64).collect();
+        let of = |ticks_per_rev: f64| restored(&t_s, &speeds, 1e-4, ticks_per_rev);
         assert!(of(500.0) == WheelLog::Ticks(Wheels::both(counts)), "counts");
         assert!(matches!(of(505.0), WheelLog::Speeds(_)), "another number of counts");
     }
 
-    /// Speeds of 0 to 3 counts, 27.16 mm/s each, that are rounded to 27, 54 and 81 mm/s: too few for their
+    /// Speeds of 0 to 3 counts, 27.17 mm/s each, that are rounded to 27, 54 and 81 mm/s: too few for their
     /// decimals to be those of rounding, unless they are counts.
     #[test]
     fn regress_rates_of_few_counts_are_the_counts() {
         let m_per_count = 0.16 * std::f64::consts::PI / 1850.0;
+        let t_s: Vec<f64> = (0..2000).map(|row| 0.01 * f64::from(row)).collect();
         let at = |row: u32| (f64::from(row) * 2.37).floor();
-        let of = |step_m_s: f64| {
-            let speeds: Vec<f64> = (0..2000).map(|row| (at(row + 1) - at(row)) * m_per_count / 0.01).collect();
-            let rounded = speeds.iter().map(|of| (of / step_m_s).round() * step_m_s).collect();
-            let t_s = (0..2000).map(|row| 0.01 * f64::from(row)).collect::<Vec<f64>>();
-            let wheels = WheelLog::Speeds(Wheels::both(rounded));
-            let mut run =
-                Run { odometry: Odometry { t_s: t_s.into(), wheels, ..Odometry::default() }, ..Run::default() };
-            restore(std::slice::from_mut(&mut run), &NominalRobot { ticks_per_rev: Some(1850.0), ..ROBOT });
-            run.odometry.wheels
-        };
+        let speeds: Vec<f64> = (0..2000).map(|row| (at(row + 1) - at(row)) * m_per_count / 0.01).collect();
         let counts: Vec<i64> = (0..2000).map(|row| (at(row + 1) - at(1)) as i64).collect();
+        let of = |step_m_s: f64| restored(&t_s, &speeds, step_m_s, 1850.0);
         assert!(of(1e-3) == WheelLog::Ticks(Wheels::both(counts)), "counts");
         assert!(matches!(of(2e-2), WheelLog::Speeds(_)), "a rounding of most of a count");
     }

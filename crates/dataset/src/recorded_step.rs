@@ -15,13 +15,12 @@ impl WheelLog {
     /// decimals than `MAX_DECIMALS`, and where they are so few that the robot may have driven at these.
     #[must_use]
     pub fn recorded_step(&self) -> Option<f64> {
-        let Decimals { per_unit, numbers } = self.decimals()?;
-        (numbers.len() >= MIN_DISTINCT_RATES).then(|| step_of(&numbers) as f64 / per_unit)
+        self.decimals().filter(Decimals::are_many).map(|decimals| decimals.step())
     }
 
     /// The same, however few the values are: of few, one in their last decimal.
     pub(crate) fn decimal_step(&self) -> Option<f64> {
-        self.recorded_step().or_else(|| Some(1.0 / self.decimals()?.per_unit))
+        self.decimals().map(|decimals| if decimals.are_many() { decimals.step() } else { 1.0 / decimals.per_unit })
     }
 
     fn decimals(&self) -> Option<Decimals> {
@@ -47,9 +46,17 @@ struct Decimals {
     numbers: BTreeSet<i64>,
 }
 
-/// The largest of one, two and five that all are multiples of.
-fn step_of(numbers: &BTreeSet<i64>) -> i64 {
-    [5, 2].into_iter().find(|step| numbers.iter().all(|number| number % step == 0)).unwrap_or(1)
+impl Decimals {
+    /// Are there more values than speeds that a robot is told to drive at?
+    fn are_many(&self) -> bool {
+        self.numbers.len() >= MIN_DISTINCT_RATES
+    }
+
+    /// The step that they are multiples of: one, two or five in their last decimal.
+    fn step(&self) -> f64 {
+        let is_of_all = |step: &i64| self.numbers.iter().all(|number| number % step == 0);
+        [5, 2].into_iter().find(is_of_all).unwrap_or(1) as f64 / self.per_unit
+    }
 }
 
 #[cfg(test)]

@@ -76,9 +76,9 @@ fn mean_and_error(values: &[f64]) -> Option<(f64, f64)> {
 
 /// Adds extrinsics and latency, common to all or for each session or run, where they predict held-out units:
 /// the measurements by their likelihood, and the ends of the runs by dead reckoning. The second condition
-/// keeps out extrinsics that lower the cost and worsen the calibration; where robots come to rest, the ends
-/// say nothing of a latency. What each run has for itself is fitted to some blocks of it and judged on the
-/// others.
+/// keeps out extrinsics that lower the cost and worsen the calibration. A latency by itself need not meet
+/// it: the ends of robots that come to rest say nothing of it. What each run has for itself is fitted to
+/// some blocks of it and judged on the others.
 pub(crate) fn add_nuisances(fit: &mut ModelFit<'_>, gate: OutlierGate) -> Result<(), EstimationError> {
     let sets = nuisance_sets(fit);
     let runs = &fit.solution.pass.runs;
