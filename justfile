@@ -24,6 +24,10 @@ sweep:
 accuracy:
     .ci/run accuracy
 
+# Is dead reckoning as fast as it was, beside a plain loop, and trials side by side beside one by one?
+speed:
+    .ci/run speed
+
 # Does diagnosis raise no more false findings, find as much and name it as rightly as it did?
 diagnosis:
     .ci/run diagnosis

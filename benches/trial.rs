@@ -5,12 +5,13 @@
 
 mod yardstick;
 
+use std::cell::Cell;
 use std::hint::black_box;
-use std::time::Instant;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use motion_programs::Schedule;
 use scenario::{Engine, Instrument, Scenario};
+use speed_gate::{Contender, Race};
 
 fn paper(engine: Engine) -> Scenario {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/paper.toml");
@@ -117,64 +118,50 @@ fn bound(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// Seconds of one call, the fastest of five times some.
-fn fastest_s(calls: u32, mut call: impl FnMut()) -> f64 {
-    let time = |_| {
-        let started = Instant::now();
-        (0..calls).for_each(|_| call());
-        started.elapsed().as_secs_f64() / f64::from(calls)
-    };
-    (0..5).map(time).fold(f64::INFINITY, f64::min)
-}
-
-/// What a trial costs beside stepping through it and beside the bare loop. In turn in every round: a busy
-/// machine slows all of them.
+/// What a trial costs beside stepping through it, beside the bare loop and beside trials side by side. In turn
+/// in every round: a busy machine slows all of them.
 #[allow(clippy::print_stdout)]
 fn ratios(_: &mut Criterion) {
     const ROUNDS: usize = 9;
-    let [mut closed, mut whole] =
-        [(); 2].map(|()| bench::Trial::new(&paper(Engine::ClosedForm), 1).expect("simulates"));
+    let [closed_form, stepping, calibrated, bare_loop, side_by_side] = [0, 1, 2, 3, 4];
+    let [mut closed, mut whole, mut lanes] =
+        [(); 3].map(|()| bench::Trial::new(&paper(Engine::ClosedForm), 1).expect("simulates"));
     let mut stepped = bench::Trial::new(&paper(Engine::Stepping { step_s: 1e-3 }), 1).expect("simulates");
     let methods = ["direct", "umbmark"].map(|name| calib::method(name).expect("there"));
     let mut bare = yardstick::Yardstick::new(1);
-    let mut number = 0;
-    let mut rounds = Vec::with_capacity(ROUNDS);
-    for _ in 0..ROUNDS {
-        let of_closed_s = fastest_s(100, || {
-            number += 1;
-            black_box(closed.drive(number).expect("drives"));
-        });
-        let of_stepping_s = fastest_s(1, || {
-            number += 1;
-            black_box(stepped.drive(number).expect("drives"));
-        });
-        let of_whole_s = fastest_s(100, || {
-            number += 1;
-            let session = [whole.drive(number).expect("drives")];
-            black_box(methods.map(|method| method.calibrate(&session).expect("applies")));
-        });
-        let of_bare_s = fastest_s(100, || {
-            black_box(bare.trial());
-        });
-        let of_block_s = fastest_s(20, || {
-            number += dataset::LANES as u64;
-            let replicates = whole.drive_side_by_side(number).expect("goes in lanes");
-            black_box(methods.map(|method| method.calibrate_replicates(replicates, dataset::LANES)));
-        });
-        rounds.push([of_closed_s, of_stepping_s, of_whole_s, of_bare_s, of_block_s / dataset::LANES as f64]);
-    }
-    let median = |of: &dyn Fn(&[f64; 5]) -> f64| {
-        let mut values: Vec<f64> = rounds.iter().map(of).collect();
-        values.sort_by(f64::total_cmp);
-        values[values.len() / 2]
+    let numbers: [Cell<u64>; 4] = Default::default();
+    let next = |contender: usize, by: u64| {
+        numbers[contender].set(numbers[contender].get() + by);
+        numbers[contender].get()
     };
+    let mut contenders = [
+        Contender::new("closed form", 100, || {
+            black_box(closed.drive(next(0, 1)).expect("drives"));
+        }),
+        Contender::new("stepping", 1, || {
+            black_box(stepped.drive(next(1, 1)).expect("drives"));
+        }),
+        Contender::new("with calibration", 100, || {
+            let session = [whole.drive(next(2, 1)).expect("drives")];
+            black_box(methods.map(|method| method.calibrate(&session).expect("applies")));
+        }),
+        Contender::new("bare loop", 100, || {
+            black_box(bare.trial());
+        }),
+        Contender::new("side by side", 20, || {
+            let replicates = lanes.drive_side_by_side(next(3, dataset::LANES as u64)).expect("goes in lanes");
+            black_box(methods.map(|method| method.calibrate_replicates(replicates, dataset::LANES)));
+        }),
+    ];
+    let race = Race::run(ROUNDS, &mut contenders);
+    let lanes = dataset::LANES as f64;
     println!("\nratios of a trial, medians of {ROUNDS} rounds");
-    println!("closed form              {:8.1} us", 1e6 * median(&|times| times[0]));
-    println!("stepping / closed form   {:8.0}", median(&|times| times[1] / times[0]));
-    println!("with calibration         {:8.1} us", 1e6 * median(&|times| times[2]));
-    println!("  of it the bare loop    {:8.0} %", 100.0 * median(&|times| times[3] / times[2]));
-    println!("side by side             {:8.2} us", 1e6 * median(&|times| times[4]));
-    println!("  gain over one by one   {:8.2}", median(&|times| times[2] / times[4]));
+    println!("closed form              {:8.1} us", 1e6 * race.seconds(closed_form));
+    println!("stepping / closed form   {:8.0}", race.ratio(stepping, closed_form).median);
+    println!("with calibration         {:8.1} us", 1e6 * race.seconds(calibrated));
+    println!("  of it the bare loop    {:8.0} %", 100.0 * race.ratio(bare_loop, calibrated).median);
+    println!("side by side             {:8.2} us", 1e6 * race.seconds(side_by_side) / lanes);
+    println!("  gain over one by one   {:8.2}", race.ratio(calibrated, side_by_side).times(lanes).median);
 }
 
 criterion_group!(benches, trial, sweep, bound, ratios);

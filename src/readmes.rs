@@ -61,3 +61,6 @@ pub struct Scenario;
 
 #[doc = include_str!("../crates/sim-yair/README.md")]
 pub struct SimYair;
+
+#[doc = include_str!("../crates/speed-gate/README.md")]
+pub struct SpeedGate;

@@ -8,6 +8,7 @@ use crate::root;
 /// Who may use whom, dev- and build-dependencies too. `estimation` and `calib` never link what could tell
 /// them the truth.
 pub(crate) const ARROWS: &[(&str, &[&str])] = &[
+    ("speed-gate", &[]),
     ("kinematics", &[]),
     ("atomic-file", &[]),
     ("dataset", &["kinematics", "atomic-file"]),
@@ -139,7 +140,9 @@ fn crates() -> BTreeMap<String, BTreeSet<String>> {
     let metadata: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
     let list = |value: &serde_json::Value| value.as_array().cloned().unwrap_or_default();
     let name = |value: &serde_json::Value| value["name"].as_str().unwrap_or_default().to_owned();
-    let ours = |dependency: &&serde_json::Value| dependency["path"].is_string();
+    // `speed-gate` times things and knows none of them: every crate's benches may use it.
+    let is_timing = |dependency: &serde_json::Value| dependency["name"] == "speed-gate" && dependency["kind"] == "dev";
+    let ours = |dependency: &&serde_json::Value| dependency["path"].is_string() && !is_timing(dependency);
     list(&metadata["packages"])
         .iter()
         .map(|package| (name(package), list(&package["dependencies"]).iter().filter(ours).map(name).collect()))

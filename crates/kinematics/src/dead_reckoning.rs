@@ -211,7 +211,7 @@ impl<C: Count> DeadReckoning<C> {
     }
 
     /// Takes new cumulative counts and returns the new pose (paper, eq. 1 to 3).
-    #[inline]
+    #[inline(always)]
     pub fn update(&mut self, counts: Wheels<C>) -> Pose {
         let steps = counts.zip_with(self.counts, C::since);
         let since = counts.zip_with(self.start_counts, C::since);

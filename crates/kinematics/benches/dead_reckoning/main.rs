@@ -4,17 +4,24 @@
 //! Every round times all contenders in turn, each by its fastest of five turns of about a millisecond, which
 //! a busy machine seldom interrupts all; what is printed are medians over rounds, of times and of ratios
 //! within a round. `docs/performance.md` has a run of it. Arguments: `--quick` for fewer rounds and no log
-//! that exceeds the caches.
+//! that exceeds the caches, `--check FILE` and `--write FILE` of `speed_gate`.
 
 mod plain;
 
 use std::hint::black_box;
-use std::time::Instant;
+use std::process::ExitCode;
 
 use kinematics::{InstructionSet, Odometry, Pose, Rule, Wheels};
+use speed_gate::{Contender, Gate, Race};
 
 /// Bytes that a step of a log moves: two counts in, a pose out.
 const BYTES_A_STEP: usize = 2 * size_of::<i64>() + size_of::<Pose>();
+
+/// The contender that the others are compared with.
+const PLAIN: usize = 0;
+
+/// The log whose ratios the gate holds.
+const GATED_STEPS: usize = 100_000;
 
 fn odometry(rule: Rule) -> Odometry {
     Odometry { m_per_count: Wheels { left: 1.0334e-3, right: 1.0322e-3 }, wheel_separation_m: 0.363, rule }
@@ -34,61 +41,28 @@ fn counts(steps: usize) -> Wheels<Vec<i64>> {
     Wheels { left: column(3), right: column(5) }
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
-}
-
-/// One thing to be timed.
-struct Contender<'a> {
-    name: String,
-    run: Box<dyn FnMut() + 'a>,
-}
-
-impl<'a> Contender<'a> {
-    fn new(name: impl Into<String>, run: impl FnMut() + 'a) -> Self {
-        Self { name: name.into(), run: Box::new(run) }
-    }
-}
-
-/// Times contenders in turn and prints each beside the first and beside the last.
+/// Times contenders in turn and prints each beside the first and beside the last. The ratios of a log that fills
+/// the caches, a step of which costs what it does in every longer log, are the gate's.
 #[allow(clippy::print_stdout)]
-fn race(
-    title: &str,
-    (steps, rounds): (usize, usize),
-    (bytes_a_step, last): (usize, &str),
-    mut contenders: Vec<Contender<'_>>,
-) {
-    // A turn is to take a millisecond or so, and only short ones are worth repeating.
-    let again = (100_000 / steps).max(1);
-    let turns = if steps > 1_000_000 { 1 } else { 5 };
-    let times: Vec<Vec<f64>> = (0..rounds)
-        .map(|_| {
-            let time = |contender: &mut Contender<'_>| {
-                let turn = |_| {
-                    let started = Instant::now();
-                    (0..again).for_each(|_| (contender.run)());
-                    started.elapsed().as_secs_f64() / (again * steps) as f64
-                };
-                (0..turns).map(turn).fold(f64::INFINITY, f64::min)
-            };
-            contenders.iter_mut().map(time).collect()
-        })
-        .collect();
-    println!("\n{title}, {steps} steps");
-    println!("{:<34} {:>8} {:>7} {:>11} {:>12}", "", "ns/step", "GB/s", "x plain", last);
+fn race(rule: &str, (steps, rounds): (usize, usize), contenders: &mut [Contender<'_>], gate: &mut Gate) {
+    let race = Race::run(rounds, contenders);
+    let copy = contenders.len() - 1;
+    println!("\nWhole log, {rule}, {steps} steps");
+    println!("{:<34} {:>8} {:>7} {:>11} {:>12}", "", "ns/step", "GB/s", "x plain", "of a copy");
     for (k, contender) in contenders.iter().enumerate() {
-        let of = |ratio: &dyn Fn(&[f64]) -> f64| median(times.iter().map(|times| ratio(times)).collect());
-        let seconds = of(&|times| times[k]);
-        let faster = of(&|times| times[0] / times[k]);
-        let of_copy = of(&|times| times[times.len() - 1] / times[k]);
-        let (ns, gb_s) = (1e9 * seconds, 1e-9 * bytes_a_step as f64 / seconds);
-        println!("{:<34} {ns:>8.2} {gb_s:>7.1} {faster:>11.2} {:>10.0} %", contender.name, 100.0 * of_copy);
+        let seconds = race.seconds(k) / steps as f64;
+        let (faster, of_copy) = (race.ratio(PLAIN, k), race.ratio(copy, k));
+        let (ns, gb_s) = (1e9 * seconds, 1e-9 * BYTES_A_STEP as f64 / seconds);
+        let percent = 100.0 * of_copy.median;
+        println!("{:<34} {ns:>8.2} {gb_s:>7.1} {:>11.2} {percent:>10.0} %", contender.name(), faster.median);
+        if steps == GATED_STEPS && k != PLAIN && k < copy - 1 {
+            gate.add(&format!("{rule}/{}/times plain", contender.name()), faster);
+        }
     }
 }
 
 /// A log with every pose stored, by each instruction set.
-fn whole_log(steps: usize, rounds: usize) {
+fn whole_log(steps: usize, rounds: usize, gate: &mut Gate) {
     let counts = counts(steps);
     let columns = Wheels { left: &counts.left[..], right: &counts.right[..] };
     // Half of the bytes are read and half written.
@@ -98,25 +72,27 @@ fn whole_log(steps: usize, rounds: usize) {
         let buffers = || (vec![Pose::IDENTITY; steps], vec![0_u8; source.len()]);
         let ((mut plain_poses, mut copied), (mut poses, _)) = (buffers(), buffers());
         let poses = std::cell::RefCell::new(&mut poses);
-        let mut contenders = vec![Contender::new("plain loop, C library", || {
+        // A turn takes a millisecond or so.
+        let calls = (100_000 / steps).max(1) as u32;
+        let mut contenders = vec![Contender::new("plain loop, C library", calls, || {
             plain::trajectory(&odometry, Pose::IDENTITY, black_box(columns), &mut plain_poses);
         })];
         for set in InstructionSet::available() {
             let poses = &poses;
-            contenders.push(Contender::new(format!("trajectory_into, {}", set.name()), move || {
+            contenders.push(Contender::new(format!("trajectory_into, {}", set.name()), calls, move || {
                 odometry.trajectory_into_by(set, Pose::IDENTITY, black_box(columns), &mut poses.borrow_mut());
             }));
         }
-        contenders.push(Contender::new("final_pose", || {
+        contenders.push(Contender::new("final_pose", calls, || {
             black_box(odometry.final_pose(Pose::IDENTITY, black_box(columns)));
         }));
-        contenders.push(Contender::new("update, one by one", || {
+        contenders.push(Contender::new("update, one by one", calls, || {
             let mut state = odometry.start(Pose::IDENTITY, Wheels::both(0_i64));
             for ((&left, &right), pose) in columns.left.iter().zip(columns.right).zip(poses.borrow_mut().iter_mut()) {
                 *pose = state.update(Wheels { left, right });
             }
         }));
-        contenders.push(Contender::new("loads and stores alone", || {
+        contenders.push(Contender::new("loads and stores alone", calls, || {
             let columns = black_box(columns);
             let rows = columns.left.iter().zip(columns.right);
             for (pose, (left, right)) in poses.borrow_mut().iter_mut().zip(rows) {
@@ -125,22 +101,25 @@ fn whole_log(steps: usize, rounds: usize) {
             }
             black_box(&poses);
         }));
-        contenders.push(Contender::new("copy of the same bytes", || {
+        contenders.push(Contender::new("copy of the same bytes", calls, || {
             copied.copy_from_slice(black_box(&source));
             black_box(&mut copied);
         }));
-        race(&format!("Whole log, {name}"), (steps, rounds), (BYTES_A_STEP, "of a copy"), contenders);
+        race(name, (steps, rounds), &mut contenders, gate);
     }
 }
 
-fn main() {
-    let quick = std::env::args().any(|argument| argument == "--quick" || argument == "--test");
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().collect();
+    let quick = arguments.iter().any(|argument| argument == "--quick" || argument == "--test");
     let rounds = if quick { 9 } else { 41 };
-    for steps in [100, 1_000, 100_000] {
-        whole_log(steps, rounds);
+    let mut gate = Gate::new("dead_reckoning");
+    for steps in [100, 1_000, GATED_STEPS] {
+        whole_log(steps, rounds, &mut gate);
     }
     if !quick {
-        whole_log(1_000_000, 15);
-        whole_log(10_000_000, 9);
+        whole_log(1_000_000, 15, &mut gate);
+        whole_log(10_000_000, 9, &mut gate);
     }
+    gate.exit_code(&arguments)
 }
