@@ -9,6 +9,7 @@ use kinematics::Increment;
 
 use crate::hidden_effects::robot;
 use crate::motion_capture::simulated;
+use crate::plain_robot::PlainRobot;
 use crate::support::real_data::real_data;
 
 fn diagnosed(dataset: &Dataset) -> Document {
@@ -182,4 +183,33 @@ fn a_khepera_has_rows_of_false_length_and_wheels_of_its_published_size() {
         // Two of its standard deviations, and less than a twentieth of what the loss made of it.
         assert!(off.abs() < 0.02, "{wheel}: {off}");
     }
+}
+
+/// Most people write a log a run, with counters that begin at zero: wheels that stand between the runs keep their
+/// angles all the same, and an eccentric wheel has one phase in all runs. Rejects a phase that begins anew in each
+/// run, by which nothing of it is found.
+#[test]
+fn regress_an_eccentric_wheel_is_as_plain_where_counters_begin_anew() {
+    let robot = PlainRobot { eccentricity: 3e-3, ..PlainRobot::ordinary(3510) };
+    let (folder, _) = robot.written();
+    let goes_on = dataset::read(folder.path()).expect("a dataset").dataset;
+    let mut anew = goes_on.clone();
+    for run in &mut anew.runs {
+        let WheelLog::Ticks(ticks) = &mut run.odometry.wheels else { panic!("counts") };
+        for column in [&mut ticks.left, &mut ticks.right] {
+            let first = column[0];
+            column.iter_mut().for_each(|count| *count -= first);
+        }
+    }
+    let written = tempfile::tempdir().expect("a folder");
+    dataset::write(&anew, written.path(), dataset::Existing::Refuse).expect("written");
+    let anew = dataset::read(written.path()).expect("a dataset").dataset;
+    let z_of = |dataset: &Dataset| {
+        let document = diagnosed(dataset);
+        assert_eq!(document.findings[0].names, ["wheel_eccentricity"]);
+        document.findings[0].z
+    };
+    let [goes_on, anew] = [&goes_on, &anew].map(z_of);
+    println!("z {goes_on} where counters go on, {anew} where they begin anew");
+    assert!(anew > 0.9 * goes_on, "{anew} of {goes_on}");
 }

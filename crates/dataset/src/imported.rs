@@ -5,6 +5,7 @@ use crate::error::DatasetError;
 use crate::read::Loaded;
 use crate::record::{Dataset, Run};
 use crate::warning::Warning;
+use crate::wheel_angles::AngleCarrier;
 
 /// One dataset that was found in another format.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,9 +34,11 @@ impl Source {
         header: Dataset,
         runs: impl Iterator<Item = Result<Run, DatasetError>> + Send + 'static,
     ) -> Self {
-        let of_run = header.clone();
+        let (of_run, mut carrier) = (header.clone(), AngleCarrier::default());
         let runs = runs.map(move |run| {
-            let dataset = Dataset { runs: vec![run?], ..of_run.clone() };
+            let mut run = run?;
+            carrier.carry_into(&mut run, &of_run.robot);
+            let dataset = Dataset { runs: vec![run], ..of_run.clone() };
             let warnings = counter::wrap_warnings(&dataset);
             Ok(Loaded { dataset, warnings })
         });

@@ -44,6 +44,7 @@ mod timestamps;
 mod unit;
 mod unknown_motion;
 mod warning;
+mod wheel_angles;
 mod write;
 
 pub use column_names::Quantity;

@@ -7,6 +7,7 @@
 use dataset::Dataset;
 
 use crate::clock_profile::{Profile, RunClock};
+use crate::names::run_name;
 use crate::settings::records::{MIN_CLOCK_GAIN, MIN_CLOCK_RUNS, MIN_RUNS_PER_ODD_CLOCK};
 
 /// An offset of the instrument's clock: its poses are of so long before their stamps.
@@ -41,7 +42,6 @@ pub(crate) fn clock_offsets(datasets: &[Dataset], clocks: &[RunClock], min_commo
     let all: Vec<OfRun<'_>> =
         clocks.iter().filter_map(|clock| Some(OfRun { run: clock.run, profile: clock.whole.as_ref()? })).collect();
     let Some(common_s) = common_offset_s(&all) else { return Clocks::default() };
-    let id = |(session, position): (usize, usize)| datasets[session].runs[position].info.id.clone();
     let is_odd = |of: &&OfRun<'_>| {
         let apart_s = (of.profile.offset_s - common_s).abs();
         all.len() >= MIN_CLOCK_RUNS
@@ -54,7 +54,7 @@ pub(crate) fn clock_offsets(datasets: &[Dataset], clocks: &[RunClock], min_commo
     let few = (all.len() / MIN_RUNS_PER_ODD_CLOCK).max(1);
     let odd = if odd.len() <= few { odd } else { Vec::new() };
     let own = |of: &&OfRun<'_>| ClockOffset {
-        runs: Some(vec![id(of.run)]),
+        runs: Some(vec![run_name(datasets, of.run)]),
         offset_s: of.profile.offset_s,
         sigma_s: of.profile.sigma_s,
         gain: of.profile.gain_over(common_s),

@@ -25,6 +25,7 @@ use crate::gain::gain_by_level;
 use crate::large_log::LargeLog;
 use crate::log_rows::{check_rows, check_spans};
 use crate::mean_structure::{THINNED, mean_structure};
+use crate::names::session_names;
 use crate::plan::{Limits, next_experiment};
 use crate::record_faults::{Fault, determines_wheels, fault, is_correlated, rejected_share, sessions};
 use crate::residuals::{Residuals, residuals};
@@ -329,11 +330,14 @@ fn stages(
         None => base,
     });
     let before = as_stamped.as_ref().unwrap_or(&structure.base);
-    let nothing_added = model.candidates.is_empty() && stamps.is_none();
-    let (gain, gain_why_null) = if nothing_added {
+    // What is reported, handed on and measured is one model.
+    let carried = carried(&structure.base, model, &findings);
+    let (gain, gain_why_null) = if !carried.candidates.is_empty() || stamps.is_some() {
+        gain_of(before, &carried, &names)
+    } else if model.candidates.is_empty() {
         (None, Some("nothing was added to the calibrated model's mean".to_owned()))
     } else {
-        gain_of(before, model, &names)
+        (None, Some("no cause is certain enough for the extended model".to_owned()))
     };
     begins(Step::Detectability);
     let (sensitivity, blind_to) = detectability(model, &catalogue, &mut structure.found.known.clone());
@@ -344,7 +348,6 @@ fn stages(
             next_experiment(records, (&structure.base, &structure.found), (model, &catalogue, &blind_to), limits)
         }
     };
-    let carried = carried(&structure.base, model, &findings);
     let extended = crate::extended_scenario::scenario_of(records, &datasets[0].robot, &faults, stamps, &carried);
     begins(Step::Residuals);
     let residuals = residuals(&structure.base, model);
@@ -368,7 +371,7 @@ fn stages(
         candidates: alternatives.iter().map(text::candidate).collect(),
         blind_to,
         sensitivity,
-        calibration: calibration_of(model),
+        calibration: calibration_of(&carried),
         gain,
         gain_why_null,
         nested: Vec::new(),
@@ -394,12 +397,6 @@ fn stages(
             geometry_alone,
         },
     })
-}
-
-/// What sessions are called.
-pub(crate) fn session_names(datasets: &[Dataset]) -> Vec<String> {
-    let name = |dataset: &Dataset| dataset.provenance.name.clone().unwrap_or_else(|| "dataset".to_owned());
-    datasets.iter().map(name).collect()
 }
 
 /// The base fit, of thinned measurements where odometry seems uncorrelated with all of them: between frequent

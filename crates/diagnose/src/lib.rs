@@ -43,6 +43,7 @@ mod log_rows;
 mod mean_lateness;
 mod mean_structure;
 mod model_comparison;
+mod names;
 mod nested_gain;
 mod noise_effects;
 mod null_distribution;

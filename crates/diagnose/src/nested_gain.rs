@@ -12,10 +12,11 @@ use kinematics::Pose;
 
 use crate::augmented_model::AugmentedModel;
 use crate::carry_over::{Level, Units};
-use crate::diagnosis::{DiagnoseError, Diagnosis, Options, diagnose, session_names};
+use crate::diagnosis::{DiagnoseError, Diagnosis, Options, diagnose};
 use crate::document::{Compared, GainLevel, HeldOutUnit, NestedGain};
 use crate::extended_model::ExtendedModel;
 use crate::gain::{HeldOut, drift};
+use crate::names::session_names;
 use crate::record_faults::sessions;
 
 /// The gains with whole kinds of path and whole sessions left out of the diagnosis, where there are several.

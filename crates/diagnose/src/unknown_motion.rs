@@ -17,6 +17,7 @@ use rayon::prelude::*;
 pub(crate) use self::events::AnomalyKind;
 use self::events::{Event, Limits};
 use self::other_extrinsics::{OtherExtrinsics, other_extrinsics};
+use crate::names::run_name;
 use crate::pose_windows::{CalibratedTracks, PoseTrack};
 use crate::settings::records::{MAX_UNKNOWN_EVENTS_PER_RUN, MAX_UNKNOWN_SHARE};
 
@@ -78,20 +79,25 @@ pub(crate) fn unknown_motions(
     }
     let mut records = datasets.to_vec();
     let mut anomalies: Vec<Anomaly> = Vec::new();
-    let id = |(session, run): (usize, usize)| datasets[session].runs[run].info.id.clone();
     for (track, Event { poses, kind, displacement, sigmas }) in events {
         let track = &tracks[track];
         let [from_s, to_s] = [poses.start, poses.end - 1].map(|pose| track.t_s[pose]);
         records[track.run.0].runs[track.run.1].add_unknown_motion([UnknownMotion { from_s, to_s }]);
         let displacement = Pose::new(displacement.x, displacement.y, displacement.z);
-        anomalies.push(Anomaly { kind, run: id(track.run), span_s: [from_s, to_s], displacement, sigmas });
+        anomalies.push(Anomaly {
+            kind,
+            run: run_name(datasets, track.run),
+            span_s: [from_s, to_s],
+            displacement,
+            sigmas,
+        });
     }
     let mut left_out: Vec<(usize, usize)> = Vec::new();
     for (track, OtherExtrinsics { kind, displacement, sigmas }) in otherwise {
         let track = &tracks[track];
         left_out.push(track.run);
         let span_s = [track.t_s[0], track.t_s[track.len() - 1]];
-        anomalies.push(Anomaly { kind, run: id(track.run), span_s, displacement, sigmas });
+        anomalies.push(Anomaly { kind, run: run_name(datasets, track.run), span_s, displacement, sigmas });
     }
     left_out.sort_unstable();
     for (session, run) in left_out.into_iter().rev() {

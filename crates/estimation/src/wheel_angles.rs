@@ -81,19 +81,21 @@ impl<'a> WheelAngleInterpolator<'a> {
         if odometry.t_s.is_empty() {
             return None;
         }
-        let mut first_rad = Wheels::both(0.0);
+        let (mut first_rad, ahead_rad) = (Wheels::both(0.0), run.run().wheels_ahead_rad);
         let mut quantum_rad = Wheels::both(0.0);
         let recorded_rates = RecordedRates::of(run, robot);
         let turn_rad = match &odometry.wheels {
             WheelLog::Ticks(ticks) => {
                 let rad = std::f64::consts::TAU / robot.ticks_per_rev?;
-                let mark = |column: &[i64]| (column[0] as f64 * rad).rem_euclid(std::f64::consts::TAU);
-                first_rad = ticks.as_ref().map(|column| mark(column));
+                let mark = |column: &Vec<i64>, ahead_rad: f64| {
+                    (column[0] as f64 * rad + ahead_rad).rem_euclid(std::f64::consts::TAU)
+                };
+                first_rad = ticks.as_ref().zip_with(ahead_rad, mark);
                 quantum_rad = Wheels::both(rad.abs());
                 ticks.as_ref().map(|column| since_first(column, rad))
             }
             WheelLog::Angles(angles) => {
-                first_rad = angles.as_ref().map(|column| column[0]);
+                first_rad = angles.as_ref().zip_with(ahead_rad, |column, ahead_rad| column[0] + ahead_rad);
                 quantum_rad = angles.as_ref().map(|column| quantum_of_angles(column));
                 angles.as_ref().map(|column| since_first(column, 1.0))
             }
@@ -113,8 +115,10 @@ impl<'a> WheelAngleInterpolator<'a> {
         let period = if has_period { odometry.t_s.sampling_period() } else { None };
         let late_s = period.map_or_else(|| vec![0.0; odometry.t_s.len()], |period| period.late_s.clone());
         let rates = WheelRates::of((&odometry.t_s, &late_s), &turn_rad, quantum_rad, drive, continuous);
+        // Stamps that do not tell the tick do not tell by how many periods they are late.
+        let most_s = period.filter(|period| !period.is_certain()).map_or(f64::INFINITY, |period| period.period_s);
         let late_s = if continuous {
-            late_s.windows(2).map(|pair| [pair[0], pair[1]]).collect()
+            late_s.windows(2).map(|pair| [pair[0], pair[1]].map(|late_s| late_s.clamp(-most_s, most_s))).collect()
         } else {
             // Which end of a row between gaps is off nobody knows; the length counts.
             row_jitter_s(&odometry.t_s).into_iter().map(|jitter_s| [-0.5 * jitter_s, 0.5 * jitter_s]).collect()
@@ -157,8 +161,8 @@ impl<'a> WheelAngleInterpolator<'a> {
         &self.turn_rad
     }
 
-    /// The wheels' angles at the first row, by the counters, radians; 0 for a robot that reports only its
-    /// twist.
+    /// The wheels' angles at the first row, by the counters and what they were set back by, radians; 0 for a robot
+    /// that reports only its twist.
     #[must_use]
     pub const fn first_rad(&self) -> Wheels<f64> {
         self.first_rad

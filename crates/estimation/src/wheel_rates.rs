@@ -11,9 +11,9 @@
 use kinematics::Wheels;
 
 use crate::settings::{
-    GAP_RATIO, GENTLE_ACCELERATION_M_S2, MAX_EXACT_JITTER, MAX_ROUNDING_S, MAX_ROW_RATE_NOISE, MAX_STEADY_ROW_S,
-    MIN_BEAT_JITTER, MIN_GRID_FRACTION, MIN_GRID_STEPS, MIN_QUANTUM_RAD, QUANTUM_TOLERANCE, RATE_NOISE_FRACTION,
-    RATE_ROUNDING_FRACTION, RATE_WINDOWS,
+    GAP_RATIO, GENTLE_ACCELERATION_M_S2, MAX_EXACT_JITTER, MAX_ROUNDING_S, MAX_ROW_RATE_NOISE, MAX_ROW_SPREAD,
+    MAX_STEADY_ROW_S, MIN_BEAT_JITTER, MIN_GRID_FRACTION, MIN_GRID_STEPS, MIN_PACKET_ROW_SHARE, MIN_QUANTUM_RAD,
+    MIN_ROW_SHARE, QUANTUM_TOLERANCE, RATE_NOISE_FRACTION, RATE_ROUNDING_FRACTION, RATE_WINDOWS, ROWS_OF_STRETCH,
 };
 
 /// Rates at the rows of a run.
@@ -58,12 +58,17 @@ impl WheelRates {
         // Where stamps jitter, rows that came together are no fast wheels: the beat says when rows were due.
         // Stamps that counts follow are true however they jitter.
         let due_s: Vec<f64>;
-        let t_s = if jitter_s > MAX_EXACT_JITTER * row_s {
+        let (mut t_s, mut came_together) = (t_s, false);
+        if jitter_s > MAX_EXACT_JITTER * row_s {
             due_s = due(t_s, late_s, wrong_share);
-            &due_s
-        } else {
-            t_s
-        };
+            t_s = &due_s;
+        }
+        let apart_s: Vec<f64>;
+        if continuous && wrong_share > 0.0 {
+            apart_s = apart(t_s, least_row_s(t_s, turn_rad, quantum_rad), wrong_share);
+            came_together = apart_s != t_s;
+            t_s = &apart_s;
+        }
         let pieces = pieces(t_s, continuous);
         let stretch_s = median(t_s.windows(2).map(|pair| pair[1] - pair[0])).unwrap_or(0.0);
         let m_per_rad = [m_per_rad.left, m_per_rad.right];
@@ -73,6 +78,7 @@ impl WheelRates {
         let mean_square = [0, 1].map(|side| mean_square_rate(t_s, turns[side]));
         let variance = [0, 1].map(|side| quanta[side].powi(2) / 12.0 + mean_square[side] * jitter_s * jitter_s);
         let row_by_row = stretch_s > 0.0
+            && !came_together
             && [0, 1]
                 .iter()
                 .all(|&side| 2.0 * variance[side] / (stretch_s * stretch_s) <= MAX_ROW_RATE_NOISE * mean_square[side]);
@@ -233,6 +239,47 @@ fn due(t_s: &[f64], late_s: &[f64], wrong_share: f64) -> Vec<f64> {
         latest_s
     };
     t_s.iter().zip(late_s).map(&mut next).collect()
+}
+
+/// Rows that were read one after the other and stamped together, as after a pause of the receiver: no row was
+/// read after its stamp, nor nearer to the next than the least row. `wrong_share` is as in [`due`].
+fn apart(t_s: &[f64], least_row_s: impl Fn(usize) -> f64, wrong_share: f64) -> Vec<f64> {
+    let (mut apart_s, mut next_s) = (t_s.to_vec(), f64::INFINITY);
+    for (row, at_s) in apart_s.iter_mut().enumerate().rev() {
+        let latest_s = next_s - least_row_s(row);
+        next_s = at_s.min(latest_s);
+        if latest_s < *at_s {
+            *at_s -= wrong_share * (*at_s - latest_s);
+        }
+    }
+    apart_s
+}
+
+/// The least time from the reading of a row to that of the next: a share of the usual one, by the median of the rows
+/// around. Where most rows are stamped together with others, as in packets, the usual one is the mean over rows in
+/// which the wheels turn on: pauses in which they stand say nothing of the rows beside them.
+fn least_row_s<'t>(
+    t_s: &'t [f64],
+    turn_rad: &Wheels<Vec<f64>>,
+    quantum_rad: Wheels<f64>,
+) -> impl Fn(usize) -> f64 + 't {
+    let lengths_s: Vec<f64> = t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let turns_on = |row: &usize| {
+        let turned =
+            |turn_rad: &[f64], quantum_rad: f64| (turn_rad[row + 1] - turn_rad[*row]).abs() > 2.0 * quantum_rad;
+        turned(&turn_rad.left, quantum_rad.left) || turned(&turn_rad.right, quantum_rad.right)
+    };
+    let mean_s = mean((0..lengths_s.len()).filter(turns_on).map(|row| lengths_s[row]));
+    let in_packets = mean_s > MAX_ROW_SPREAD * median(lengths_s.iter().copied()).unwrap_or(0.0);
+    // Medians of stretches: rates of rows may differ along a log.
+    let medians_s: Vec<f64> =
+        lengths_s.chunks(ROWS_OF_STRETCH).map(|stretch| median(stretch.iter().copied()).unwrap_or(0.0)).collect();
+    move |row| {
+        if in_packets {
+            return MIN_PACKET_ROW_SHARE * mean_s;
+        }
+        MIN_ROW_SHARE * medians_s.get(row.min(t_s.len().saturating_sub(2)) / ROWS_OF_STRETCH).copied().unwrap_or(0.0)
+    }
 }
 
 /// Share of what stamps jitter by that is true, 0 to 1: a row that was read late has turned on by as much.

@@ -391,7 +391,9 @@ fn assemble(
     let recorded = recorded(both.wheels.times.iter().map(|times| times.received_ns));
     let provenance = Provenance { name, notes: Some(notes), recorded, ..Provenance::default() };
     let truth_noise = TruthNoise::default();
-    Ok((Dataset { provenance, robot, truth_noise, points: Vec::new(), runs }, spans))
+    let mut dataset = Dataset { provenance, robot, truth_noise, points: Vec::new(), runs };
+    dataset.carry_wheel_angles();
+    Ok((dataset, spans))
 }
 
 fn refuse_fractions(rows: &WheelRows, wheels: &[[f64; 2]]) -> Result<(), RosBagError> {

@@ -75,6 +75,7 @@ pub fn read(dir: &Path) -> Result<Loaded, DatasetError> {
     }
     header.runs.iter_mut().for_each(|run| corrections.apply(run));
     counted::restore(&mut header.runs, &header.robot);
+    header.carry_wheel_angles();
     warnings.extend(counter::wrap_warnings(&header));
     Ok(Loaded { dataset: header, warnings })
 }

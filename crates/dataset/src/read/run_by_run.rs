@@ -11,6 +11,7 @@ use crate::counter;
 use crate::error::DatasetError;
 use crate::record::{Dataset, Run};
 use crate::warning::Warning;
+use crate::wheel_angles::AngleCarrier;
 
 /// Reads a dataset one run at a time: an iterator over datasets of one run each, in the order of
 /// `dataset.toml`, with what was noticed of the run.
@@ -26,8 +27,8 @@ pub struct RunByRun {
 /// The runs that have not been handed out.
 #[derive(Debug)]
 enum Rest {
-    /// With the number of the next.
-    Grouped(Box<Grouped>, usize),
+    /// With the number of the next, and how far the wheels have turned before it.
+    Grouped(Box<Grouped>, usize, AngleCarrier),
     /// All are in memory.
     Mixed(std::vec::IntoIter<Run>),
     /// There was a fault.
@@ -42,7 +43,7 @@ impl RunByRun {
     pub fn open(dir: &Path) -> Result<Self, DatasetError> {
         let (header, warnings, grouped) = Grouped::survey(Opened::open(dir)?, false)?;
         if let Some(grouped) = grouped {
-            return Ok(Self { header, warnings, rest: Rest::Grouped(Box::new(grouped), 0) });
+            return Ok(Self { header, warnings, rest: Rest::Grouped(Box::new(grouped), 0, AngleCarrier::default()) });
         }
         let Loaded { mut dataset, warnings } = read(dir)?;
         let runs = std::mem::take(&mut dataset.runs);
@@ -67,19 +68,21 @@ impl Iterator for RunByRun {
 
     fn next(&mut self) -> Option<Self::Item> {
         match &mut self.rest {
-            Rest::Grouped(grouped, next) => match grouped.read(grouped.info(*next)?.clone(), *next, &self.header.robot)
-            {
-                Ok(run) => {
-                    *next += 1;
-                    let dataset = Dataset { runs: vec![run], ..self.header.clone() };
-                    let warnings = counter::wrap_warnings(&dataset);
-                    Some(Ok(Loaded { dataset, warnings }))
+            Rest::Grouped(grouped, next, carrier) => {
+                match grouped.read(grouped.info(*next)?.clone(), *next, &self.header.robot) {
+                    Ok(mut run) => {
+                        *next += 1;
+                        carrier.carry_into(&mut run, &self.header.robot);
+                        let dataset = Dataset { runs: vec![run], ..self.header.clone() };
+                        let warnings = counter::wrap_warnings(&dataset);
+                        Some(Ok(Loaded { dataset, warnings }))
+                    }
+                    Err(error) => {
+                        self.rest = Rest::Failed;
+                        Some(Err(error))
+                    }
                 }
-                Err(error) => {
-                    self.rest = Rest::Failed;
-                    Some(Err(error))
-                }
-            },
+            }
             // What was noticed of all was said before the first.
             Rest::Mixed(runs) => {
                 let dataset = Dataset { runs: vec![runs.next()?], ..self.header.clone() };

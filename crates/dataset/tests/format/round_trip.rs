@@ -241,6 +241,7 @@ fn run(form: Form, points: usize) -> impl Strategy<Value = Run> {
                 unknown_motion: Vec::new(),
                 restored_motion: Vec::new(),
                 session_m: None,
+                wheels_ahead_rad: Wheels::both(0.0),
             }
         })
 }

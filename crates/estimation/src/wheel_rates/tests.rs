@@ -100,6 +100,27 @@ fn rows_of_one_number_on_the_beat_have_rates() {
     assert!(rates.iter().all(|rate| rate.is_finite()), "{rates:?}");
 }
 
+/// A receiver that pauses for ten rows, and rows that are sent by five: the wheels turn at 3 rad/s throughout.
+/// Rejects speeds by the stamps, of 300 rad/s.
+#[test]
+fn regress_rows_that_are_stamped_together_are_no_fast_wheels() {
+    let turns = Wheels::both((0..400).map(|row| 0.03 * f64::from(row)).collect::<Vec<f64>>());
+    let pause =
+        |row: u32| if (200..210).contains(&row) { 2.09 + 1e-4 * f64::from(row - 209) } else { 0.01 * f64::from(row) };
+    let packets = |row: u32| 0.01 * f64::from(row / 5 * 5 + 4) + 1e-4 * f64::from(row % 5);
+    for (name, stamp) in [("pause", &pause as &dyn Fn(u32) -> f64), ("packets", &packets)] {
+        let t_s: Vec<f64> = (0..400).map(stamp).collect();
+        let found = WheelRates::of((&t_s, &[0.0; 400]), &turns, Wheels::both(0.0), DRIVE, true);
+        assert!(!found.window.row_by_row, "{name}");
+        let (least, most) = found
+            .at_rows_rad_s
+            .left
+            .iter()
+            .fold((f64::MAX, 0.0), |(least, most), rate| (f64::min(least, *rate), f64::max(most, *rate)));
+        assert!(least > 1.0 && most < 4.5, "{name}: {least} to {most}");
+    }
+}
+
 #[test]
 fn counts_say_whether_stamps_are_true() {
     let jitter = |row: u32| 0.004 * (f64::from(row.wrapping_mul(2_654_435_761) >> 16) / 65_536.0 - 0.5);

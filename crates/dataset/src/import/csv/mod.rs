@@ -88,7 +88,8 @@ fn dataset(
     let mut took = tell(&parts, &raw, &units, &time_units, runs_by, options);
     took.remarks.splice(0..0, remarks);
     let provenance = Provenance { name: Some(name.clone()), ..Provenance::default() };
-    let dataset = Dataset { provenance, robot, truth_noise: TruthNoise::default(), points: Vec::new(), runs };
+    let mut dataset = Dataset { provenance, robot, truth_noise: TruthNoise::default(), points: Vec::new(), runs };
+    dataset.carry_wheel_angles();
     let warnings = crate::counter::wrap_warnings(&dataset);
     Ok(FromCsv { imported: Imported { name, dataset, warnings }, took })
 }
