@@ -3,7 +3,8 @@
 //! Model: shown angle = φ + A sin(nφ + φ₀) per wheel: an eccentric or tilted disc (n = 1, 2), gear teeth,
 //! quadrature phases.
 //! Signature: e_dx and e_dθ locked to that wheel's phase, n times a turn.
-//! Observability: a continuous log with more than 2n samples a turn.
+//! Observability: a continuous log with more than 2n samples a turn, and the phase over runs as
+//! `wheel_eccentricity` has it.
 //! Alias: `wheel_eccentricity` at n = 1, exactly.
 //! Reference: geometry of an eccentric disc, A = e/r_disc over the gear's ratio.
 

@@ -106,7 +106,7 @@ fn rows_of_one_number_on_the_beat_have_rates() {
 fn regress_rows_that_are_stamped_together_are_no_fast_wheels() {
     let turns = Wheels::both((0..400).map(|row| 0.03 * f64::from(row)).collect::<Vec<f64>>());
     let pause =
-        |row: u32| if (200..210).contains(&row) { 2.09 + 1e-4 * f64::from(row - 209) } else { 0.01 * f64::from(row) };
+        |row: u32| if (200..210).contains(&row) { 2.09 - 1e-4 * f64::from(209 - row) } else { 0.01 * f64::from(row) };
     let packets = |row: u32| 0.01 * f64::from(row / 5 * 5 + 4) + 1e-4 * f64::from(row % 5);
     for (name, stamp) in [("pause", &pause as &dyn Fn(u32) -> f64), ("packets", &packets)] {
         let t_s: Vec<f64> = (0..400).map(stamp).collect();
