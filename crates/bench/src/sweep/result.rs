@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use dataset::{NotNegative, Number, Share, checked};
+use dataset::{NotNegative, Number, Positive, Share, checked};
 use scenario::Level;
 use serde::{Deserialize, Serialize};
 
@@ -95,7 +95,7 @@ pub struct EstimatorResult {
     /// The parameter's key.
     pub parameter: String,
     /// Its true value, SI.
-    #[serde(deserialize_with = "checked::<Number, _>")]
+    #[serde(deserialize_with = "checked::<Positive, _>")]
     pub truth: f64,
     /// Mean error.
     #[serde(default, deserialize_with = "checked::<Option<Number>, _>")]
