@@ -5,6 +5,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use yair::command::{Watch, call};
+use yair::dataset::{self, Existing, Timestamp};
+use yair::scenario::Scenario;
+use yair::sim_yair::simulate;
 
 /// The files of one input: path in its folder, and bytes.
 pub(crate) type Sample = Vec<(String, Vec<u8>)>;
@@ -15,7 +18,7 @@ fn root() -> PathBuf {
     std::env::var_os("CARGO_MANIFEST_DIR").map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")), PathBuf::from)
 }
 
-fn files(folder: &Path) -> Vec<PathBuf> {
+pub(crate) fn files(folder: &Path) -> Vec<PathBuf> {
     let mut all: Vec<PathBuf> =
         fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path()).collect();
     all.retain(|path| path.is_file());
@@ -81,6 +84,41 @@ pub(crate) fn bags_in_sqlite() -> Vec<Sample> {
 
 pub(crate) fn metadata() -> Vec<Sample> {
     together("fuzz/corpus/bag")
+}
+
+/// What `yair fleet --out` keeps of two sessions of one robot, with their datasets, made here.
+pub(crate) fn kept_sessions() -> Vec<Sample> {
+    let temporary = tempfile::tempdir().expect("a temporary folder");
+    let at = temporary.path();
+    let scenario = Scenario::read(&root().join("scenarios/motion-capture.toml")).expect("a scenario");
+    for session in 0..2_u32 {
+        let mut made = simulate(&scenario, 2, session.into()).expect("simulated").dataset;
+        made.provenance.robot_id = Some("cart-1".to_owned());
+        made.provenance.recorded = Some(Timestamp::constant(i64::from(86_400 * session), 0));
+        dataset::write(&made, &at.join(format!("sets/{session}")), Existing::Refuse).expect("written");
+    }
+    let folders = ["sets", "kept"].map(|name| at.join(name).display().to_string());
+    let done = call(["yair", "fleet", &folders[0], "--calibrate-only", "--out", &folders[1]], &Arc::default());
+    assert_eq!(done.exit_code, 0, "{:?}", done.failure);
+    let of = |folder: &str| -> Sample {
+        let named_in = |path: &PathBuf| {
+            let (name, bytes) = named(path);
+            (format!("{folder}/{name}"), bytes)
+        };
+        files(&at.join(folder)).iter().map(named_in).collect()
+    };
+    vec![["sets/0", "sets/1", "kept/sessions"].into_iter().flat_map(of).collect()]
+}
+
+/// The result of a small sweep, which is a baseline too.
+pub(crate) fn accuracy_baselines() -> Vec<Sample> {
+    let scenario = root().join("scenarios/paper.toml").display().to_string();
+    let done = call(["yair", "sweep", &scenario, "--trials", "16"], &Arc::default());
+    vec![vec![("baseline.json".to_owned(), done.document.expect("a result").into_bytes())]]
+}
+
+pub(crate) fn diagnosis_baselines() -> Vec<Sample> {
+    vec![vec![named(&root().join("baselines/diagnosis.json"))]]
 }
 
 /// No files: what is odd is made by the target.

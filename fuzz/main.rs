@@ -241,6 +241,12 @@ fn regress_a_figure_of_the_smallest_doubles_has_ticks() {
     mended("sweep-state", &[200_002_179]);
 }
 
+/// A true value of 5e-324 or 0, by which errors are divided, gave "inf" on the page of the result.
+#[test]
+fn regress_a_true_value_that_nothing_can_be_divided_by_is_refused() {
+    mended("sweep-state", &[900_000_290, 900_001_250]);
+}
+
 /// Information beyond doubles gave odds that were none, and a search without a cause; a term that a fit does
 /// not determine was printed with ± NaN.
 #[test]

@@ -6,11 +6,15 @@ use std::sync::Arc;
 
 use rand::{Rng, RngExt};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use yair::bench::{self, SweepResult};
+use yair::blind_benchmark::DiagnosisBaseline;
 use yair::calib::CalibrationReport;
 use yair::command::{Watch, call};
 use yair::dataset::import::csv::{Options as CsvOptions, RobotGiven};
 use yair::dataset::{Dataset, Existing, RunByRun};
 use yair::diagnose::ExtendedModel;
+use yair::export::format::EXPORTERS;
+use yair::export::{self, CalibratedRobot};
 use yair::kinematics::Wheels;
 use yair::scenario::Scenario;
 
@@ -46,6 +50,9 @@ pub(crate) const TARGETS: &[Target] = &[
     Target { name: "calibration", corpus: corpus::calibrations, run: read_calibration, cost: 1 },
     Target { name: "extended", corpus: corpus::extended, run: read_extended, cost: 1 },
     Target { name: "sweep-state", corpus: corpus::states, run: read_states, cost: 2 },
+    Target { name: "kept-sessions", corpus: corpus::kept_sessions, run: read_kept, cost: 4 },
+    Target { name: "accuracy-baseline", corpus: corpus::accuracy_baselines, run: read_accuracy, cost: 1 },
+    Target { name: "diagnosis-baseline", corpus: corpus::diagnosis_baselines, run: read_diagnosis, cost: 1 },
     Target { name: "calibrators", corpus: corpus::none, run: odd_datasets::calibrated, cost: 4 },
     Target { name: "diagnosis", corpus: corpus::none, run: odd_datasets::diagnosed, cost: 20 },
 ];
@@ -233,9 +240,28 @@ fn read_calibration(all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Path) 
                 assert!([latency_s, sensor.x_m, sensor.y_m, sensor.theta_rad].iter().all(|value| value.is_finite()));
                 let _ = calibration.implausible_for(&nominal);
             }
-            report.to_toml().expect("it has a form");
+            let mut printed = report.to_toml().expect("it has a form");
+            for method in &report.methods {
+                let Ok(robot) = CalibratedRobot::of_method("c.toml", method, Some(&nominal)) else { continue };
+                for format in EXPORTERS {
+                    printed += &(format.render)(&robot, &export::Options::default()).unwrap_or_default();
+                }
+            }
+            are_numbers(&printed, at);
             true
         }
+    }
+}
+
+/// No number in what was printed is none, unless a text of the files in the folder says so.
+fn are_numbers(printed: &str, at: &Path) {
+    let of = |text: &str| {
+        let mut words = text.split(|letter: char| !letter.is_alphanumeric());
+        words.find(|word| ["NaN", "nan", "inf"].contains(word)).map(str::to_owned)
+    };
+    if let Some(word) = of(printed) {
+        let said = |path: &PathBuf| fs::read(path).is_ok_and(|bytes| of(&String::from_utf8_lossy(&bytes)).is_some());
+        assert!(corpus::files(at).iter().any(said), "{word} in {printed}");
     }
 }
 
@@ -258,5 +284,76 @@ fn read_states(all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Path) -> bo
     let [one, two, out] = ["1", "2", "out"].map(|name| at.join(name).display().to_string());
     let done = call(["yair", "merge", &one, &two, "--out", &out], &Arc::new(Watch::default()));
     assert!(done.exit_code < 2, "{:?}", done.failure);
+    if let Some(document) = &done.document {
+        let result: SweepResult = serde_json::from_str(document).expect("a merged result is one");
+        assert_eq!(serde_json::to_string_pretty(&result).expect("JSON"), *document);
+        for file in ["sweep.csv", "report.html"] {
+            are_numbers(&fs::read_to_string(Path::new(&out).join(file)).expect("written"), &at.join("1"));
+        }
+    }
     done.exit_code == 0
+}
+
+/// One of the kept sessions is mutated; it is believed, or found anew from its dataset.
+fn read_kept(all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Path) -> bool {
+    let sample = &all[0];
+    let kept: Vec<usize> = (0..sample.len()).filter(|file| sample[*file].0.starts_with("kept/")).collect();
+    let (chosen, other) = (*pick(&kept, random), *pick(&kept, random));
+    for (number, (name, bytes)) in sample.iter().enumerate() {
+        let mutated = (number == chosen).then(|| text::mutated(bytes, &sample[other].1, random));
+        let path = at.join(name);
+        fs::create_dir_all(path.parent().expect("a folder")).expect("made");
+        fs::write(path, mutated.as_ref().unwrap_or(bytes)).expect("written");
+    }
+    let [sets, out, html, csv] =
+        ["sets", "kept", "page.html", "table.csv"].map(|name| at.join(name).display().to_string());
+    let arguments = ["yair", "fleet", &sets, "--calibrate-only", "--out", &out, "--html", &html, "--csv", &csv];
+    // What the folder holds is looked at before it is found anew.
+    let folder = at.join("kept/sessions");
+    let before = fs::read(folder.join(sample[chosen].0.rsplit('/').next().expect("a name"))).expect("there");
+    let done = call(arguments, &Arc::new(Watch::default()));
+    assert_eq!(done.exit_code, 0, "{:?}", done.failure);
+    fs::write(at.join("before"), before).expect("written");
+    let document = done.document.expect("a document");
+    for printed in [&document, &fs::read_to_string(html).expect("a page"), &fs::read_to_string(csv).expect("a table")] {
+        are_numbers(printed, at);
+    }
+    let document: serde_json::Value = serde_json::from_str(&document).expect("JSON");
+    for change in
+        document["robots"].as_array().expect("robots").iter().flat_map(|of| of["changes"].as_array()).flatten()
+    {
+        assert!(change.as_object().expect("a change").values().all(|value| !value.is_null()), "{change}");
+    }
+    done.remarks.iter().any(|remark| remark.starts_with("0 datasets computed"))
+}
+
+/// Of a baseline that is read every comparison has a z, or has moved.
+fn read_accuracy(all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Path) -> bool {
+    let sound: SweepResult = serde_json::from_slice(&all[0][0].1).expect("a result");
+    let path = placed(all, random, at);
+    match bench::read_baseline(&path).and_then(|baseline| bench::compare(&sound, &baseline, "baseline.json")) {
+        Err(error) => refused(&error),
+        Ok(check) => {
+            let is_none = |number: &&bench::Comparison| !number.z.is_finite();
+            assert_eq!(check.changed.iter().filter(is_none).count(), check.moved.iter().filter(is_none).count());
+            assert!(check.changed.iter().all(|number| !number.z.is_nan()));
+            assert!(check.changed.iter().all(|number| number.was.is_finite() && number.is.is_finite()));
+            true
+        }
+    }
+}
+
+/// Of a baseline that is read every p-value is one.
+fn read_diagnosis(all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Path) -> bool {
+    let sound: DiagnosisBaseline = serde_json::from_slice(&all[0][0].1).expect("a baseline");
+    match DiagnosisBaseline::read(&placed(all, random, at)) {
+        Err(error) => refused(&error),
+        Ok(baseline) => {
+            let check = baseline.check(&sound);
+            assert_eq!(check.guarded.len(), sound.guards.len());
+            assert!(check.guarded.iter().all(|guarded| (0.0..=1.0).contains(&guarded.p_value)), "{check:?}");
+            assert!((1e-7..1.0).contains(&check.level), "{check:?}");
+            true
+        }
+    }
 }

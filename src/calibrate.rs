@@ -70,11 +70,8 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let chosen: Vec<&dyn Method> =
         METHODS.iter().copied().filter(|method| arguments.method == ALL || method.name() == arguments.method).collect();
     let has_joint = chosen.iter().any(|method| method.name() == joint);
-    let large = if has_joint && !arguments.online && !arguments.profile {
-        blocks_at(&arguments.datasets)?.filter(|blocks| is_large(blocks))
-    } else {
-        None
-    };
+    let large =
+        if has_joint && !arguments.online && !arguments.profile { large_datasets(&arguments.datasets)? } else { None };
     // What is large is held for the methods that can do nothing else.
     let datasets =
         if large.is_some() && chosen.len() == 1 { Vec::new() } else { read_datasets(&arguments.datasets, terminal)? };
@@ -147,6 +144,11 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     show(&report, &robot, runs, terminal)?;
     terminal.document(&report)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Datasets that `joint` calibrates part by part; `None` where they are calibrated as a whole.
+pub(crate) fn large_datasets(paths: &[PathBuf]) -> Result<Option<Vec<Blocks>>, Failure> {
+    Ok(blocks_at(paths)?.filter(|blocks| is_large(blocks)))
 }
 
 /// `joint` on large datasets; what was noticed of them is said.

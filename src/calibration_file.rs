@@ -35,7 +35,7 @@ impl GivenCalibration {
             noise,
             trained_on: trained_on.to_vec(),
         };
-        if is_scenario(path) {
+        if is_scenario(path)? {
             let scenario = Scenario::read(path)?;
             let model = ExtendedModel::of(&scenario).map_err(|error| format!("{place}: {error}"))?;
             let noise = OdometryNoise {
@@ -136,8 +136,16 @@ impl GivenCalibration {
 
 /// Whether a file is TOML with a robot, as scenarios have it and calibration files do not. What is neither is
 /// refused as a calibration.
-pub(crate) fn is_scenario(path: &Path) -> bool {
+///
+/// # Errors
+/// Of the manifest of a dataset, which has a robot too.
+pub(crate) fn is_scenario(path: &Path) -> Result<bool, Failure> {
     let mut text = String::new();
     let read = std::fs::File::open(path).and_then(|file| file.take(LARGEST_FILE_BYTES).read_to_string(&mut text));
-    read.is_ok() && text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("robot"))
+    let Some(table) = read.ok().and_then(|_| text.parse::<toml::Table>().ok()) else { return Ok(false) };
+    if table.contains_key("robot") && table.contains_key("format") {
+        let why = "it is the manifest of a dataset, and no calibration; yair calibrate DATASET --out FILE makes one";
+        return Err(format!("{}: {why}", path.display()).into());
+    }
+    Ok(table.contains_key("robot"))
 }

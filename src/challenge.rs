@@ -14,6 +14,7 @@ use dataset::Existing;
 use serde::Serialize;
 
 use crate::challenge_shard::{ChallengeCampaign, ChallengeShard, merged};
+use crate::new_folders::NewFolders;
 use crate::shard::{ShardChoice, locked};
 use crate::terminal::{Failure, Terminal, cell, table};
 
@@ -117,6 +118,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let cases = arguments.cases.unwrap_or(if arguments.check.is_some() { CHECKED_CASES } else { DEFAULT_CASES });
     let shard = arguments.shard.map(|shard| shard.resolved(terminal)).transpose()?;
     let numbers = shard.map_or(0..cases, |shard| shard.share(cases));
+    let _new = arguments.out.as_deref().map(NewFolders::to);
     let _lock = arguments.out.as_deref().map(|out| locked(out, terminal)).transpose()?;
     let count = numbers.end - numbers.start;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
@@ -217,6 +219,7 @@ fn one(arguments: &Arguments, number: u64, terminal: &Terminal) -> Result<ExitCo
         }
     }
     if let Some(out) = &arguments.out {
+        let _new = NewFolders::to(out);
         for (session, dataset) in challenge_datasets(arguments.scope(), arguments.seed, number)?.iter().enumerate() {
             dataset::write(dataset, &out.join(format!("session_{session}")), Existing::Refuse)?;
         }

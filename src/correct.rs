@@ -13,6 +13,7 @@ use serde::Serialize;
 
 use crate::calibration_file::GivenCalibration;
 use crate::check;
+use crate::new_folders::NewFolders;
 use crate::simulate::refuse_filled;
 use crate::terminal::{Failure, Terminal, datasets_at, folder_name, warn};
 
@@ -68,6 +69,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     // All files are written beside the folder before the first is put into it.
     let beside = out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let unwritable = |error: std::io::Error| format!("{}: {}", out.display(), error.kind());
+    let _new = NewFolders::to(out);
     std::fs::create_dir_all(beside).map_err(unwritable)?;
     let waiting = WorkFolder::beside(beside).map_err(unwritable)?;
     let mut files = Files { waiting: waiting.made(), written: Vec::new() };

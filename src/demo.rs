@@ -15,6 +15,7 @@ use serde::Serialize;
 
 use crate::diagnose_command::write_diagnosis;
 use crate::html_report::drift_percents;
+use crate::new_folders::NewFolders;
 use crate::simulate::{refuse_filled, write_dataset, write_whole};
 use crate::terminal::{Failure, Terminal};
 
@@ -97,6 +98,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     robot.effects.retain(|effect| effects::description(effect.id()).is_some_and(|of| of.geometry.is_some()));
     let hidden = hide(arguments.fault.as_deref(), seed, &robot, terminal)?;
     robot.effects.push(hidden.effect.clone());
+    let _new = NewFolders::to(out);
     std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
     let path = |name: &str| out.join(name);
 

@@ -15,6 +15,7 @@ use crate::check;
 use crate::diagnosis_page::Page;
 use crate::html_report::DiagnosisPage;
 use crate::log::Log;
+use crate::plain_text::one_line;
 use crate::simulate::{refuse_filled, write_folder, write_whole};
 use crate::terminal::{Failure, Terminal, advance, cell, table};
 
@@ -121,7 +122,7 @@ fn reservations(document: &Document) -> String {
         };
         finding
             .is_of_the_mean()
-            .then(|| format!("# {} {what}: {}\n", finding.names.join(" or "), finding.carries_over_why))
+            .then(|| format!("# {} {what}: {}\n", finding.names.join(" or "), one_line(&finding.carries_over_why)))
     };
     document.findings.iter().filter_map(of).collect()
 }

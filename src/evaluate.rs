@@ -130,18 +130,18 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         EvaluationPage { calibrations: &found, datasets: &datasets }.write(out)?;
         terminal.remark(&format!("report.html in {}", out.display()));
     }
-    let last_percent = calibrations.last().and_then(|last| last.drift_percent);
-    let name = calibrations.last().map(|last| last.name.clone()).unwrap_or_default();
+    let last = calibrations.last().cloned();
     let PoseErrorOptions { alignment, delta } = pose_errors;
     terminal.document(&Document { dataset: Names::of(names), alignment, delta, calibrations })?;
-    match (arguments.max_drift, last_percent) {
-        (Some(_), None) => Err("--max-drift: the drift of these runs is not known (see why_null)".into()),
-        (Some(allowed), Some(percent)) if percent > allowed => {
-            terminal.failure(&format!("{name} drifts {percent:.3} % where {allowed} % is allowed"));
-            Ok(ExitCode::from(DRIFTS_TOO_MUCH))
-        }
-        _ => Ok(ExitCode::SUCCESS),
+    let (Some(allowed), Some(last)) = (arguments.max_drift, last) else { return Ok(ExitCode::SUCCESS) };
+    let Some(percent) = last.drift_percent else {
+        return Err("--max-drift: the drift of these runs is not known (see why_null)".into());
+    };
+    if last.is_at_most(allowed) {
+        return Ok(ExitCode::SUCCESS);
     }
+    terminal.failure(&format!("{} drifts {percent:.3} % where {allowed} % is allowed", last.name));
+    Ok(ExitCode::from(DRIFTS_TOO_MUCH))
 }
 
 /// Names of the datasets, and the drift under each calibration. One run is held at a time, for logs may be

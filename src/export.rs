@@ -18,6 +18,7 @@ use crate::calibration_file::{GivenCalibration, is_scenario};
 use crate::correct::{file_of, only};
 use crate::export_drift::{self, Drift};
 use crate::export_mcap;
+use crate::new_folders::NewFolders;
 use crate::simulate::{refuse_filled, write_whole};
 use crate::terminal::{Failure, Terminal, listed_ids, warn};
 
@@ -289,7 +290,7 @@ fn robot(arguments: &Arguments, terminal: &Terminal) -> Result<CalibratedRobot, 
         return Err(format!("{place}: {why}").into());
     }
     let nominal = arguments.dataset.as_ref().map(|path| stated(path, terminal)).transpose()?;
-    if is_scenario(source) {
+    if is_scenario(source)? {
         if let Some(method) = &arguments.method {
             return Err(
                 format!("{place}: it is an extended model and has no method {method}; leave --method out").into()
@@ -393,6 +394,7 @@ fn export_dataset(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         (Some(out), _) => {
             // All names before the first file.
             let files = texts.iter().map(|(id, _)| file_of(out, id, TUM, &place)).collect::<Result<Vec<_>, _>>()?;
+            let _new = NewFolders::to(out);
             std::fs::create_dir_all(out).map_err(|error| format!("{}: {}", out.display(), error.kind()))?;
             for (file, (_, text)) in files.iter().zip(&texts) {
                 write_whole(file, text.as_bytes())?;

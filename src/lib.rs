@@ -61,6 +61,7 @@ mod import_tum;
 mod log;
 mod manual;
 mod merge;
+mod new_folders;
 mod plain_text;
 mod plan;
 mod plan_instruments;

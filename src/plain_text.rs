@@ -44,6 +44,35 @@ fn escaped<'t>(text: &'t str, is_kept: impl Fn(char) -> bool, escape: impl Fn(ch
     Cow::Owned(text.chars().map(letter).collect())
 }
 
+/// Text of a file within one line: line ends and tabulators too are none.
+pub(crate) fn one_line(text: &str) -> String {
+    printable(text).replace(['\n', '\t'], " ")
+}
+
+/// Text of a file in Markdown, on one line: no HTML, and nothing that Markdown takes for more than text.
+pub(crate) fn markdown(text: &str) -> String {
+    let line = one_line(text);
+    let mut out = String::with_capacity(line.len());
+    let mut before = ' ';
+    let mut rest = line.chars().peekable();
+    while let Some(letter) = rest.next() {
+        let is_inside = before.is_alphanumeric() && rest.peek().is_some_and(|next| next.is_alphanumeric());
+        match letter {
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '&' => out.push_str("&amp;"),
+            // An underscore within a word, as ids have it, is none of Markdown.
+            '_' if is_inside => out.push('_'),
+            '\\' | '`' | '*' | '_' | '[' | ']' | '|' | '~' | '$' => out.extend(['\\', letter]),
+            // At the start of a line: a heading, a list.
+            '#' | '-' | '+' | '=' if out.is_empty() => out.extend(['\\', letter]),
+            other => out.push(other),
+        }
+        before = letter;
+    }
+    out
+}
+
 /// A text as a cell of a table for people. A spreadsheet takes one that begins with any of these signs for a
 /// formula; an apostrophe before it makes it a text. Numbers stay as they are.
 pub(crate) fn spreadsheet_cell(text: &str) -> Cow<'_, str> {
@@ -79,6 +108,19 @@ mod tests {
         assert!(!shown.contains(is_command), "{shown}");
         assert_ne!(shown, text);
         assert_eq!(serde_json::from_str::<serde_json::Value>(&shown).expect("JSON"), value);
+    }
+
+    #[test]
+    fn markdown_is_text() {
+        assert_eq!(markdown("<script>a</script> & b"), "&lt;script&gt;a&lt;/script&gt; &amp; b");
+        assert_eq!(
+            markdown("[a](javascript:b) ![c](d) `e` *f* __g__"),
+            "\\[a\\](javascript:b) !\\[c\\](d) \\`e\\` \\*f\\* \\_\\_g\\_\\_"
+        );
+        assert_eq!(markdown("a\u{202e}b\n# c\n| d"), "a\\\\u{202e}b # c \\| d");
+        assert_eq!((markdown("# a"), markdown("- b"), markdown("=c")), ("\\# a".into(), "\\- b".into(), "\\=c".into()));
+        let plain = "wheel_scale = 1.0e-3 ± 2.0e-4 – σ² of run-01 (p = 0.02)";
+        assert_eq!(markdown(plain), plain);
     }
 
     #[test]

@@ -11,6 +11,7 @@ use serde::Serialize;
 use crate::diagnose_command::shown_on;
 use crate::html_report::write_plan;
 use crate::log::Log;
+use crate::new_folders::NewFolders;
 use crate::plan_instruments::{Expected, expected, show as show_instruments};
 use crate::simulate::{refuse_filled, write_whole};
 use crate::terminal::{Failure, Terminal, advance, table};
@@ -222,6 +223,7 @@ fn write_scenarios(
     next: &NextExperiment,
     terminal: &Terminal,
 ) -> Result<Vec<String>, Failure> {
+    let _new = NewFolders::to(out);
     std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
     let mut written = Vec::new();
     for (number, session) in next.sessions.iter().enumerate() {

@@ -8,6 +8,7 @@ use clap::Args;
 use paper_reproduction as paper;
 
 use crate::html_report::write_reproduction;
+use crate::new_folders::NewFolders;
 use crate::simulate::{refuse_filled, write_whole};
 use crate::terminal::{Failure, Terminal};
 
@@ -39,6 +40,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let elapsed_s = started.elapsed().as_secs_f64();
     let page = reproduction.page();
     if let Some(out) = &arguments.out {
+        let _new = NewFolders::to(out);
         std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
         write_whole(&out.join("paper.md"), page.as_bytes())?;
         for (stem, _, figure) in reproduction.pictures() {

@@ -13,6 +13,7 @@ use serde::Serialize;
 use sim_yair::Simulation;
 use tempfile::NamedTempFile;
 
+use crate::new_folders::NewFolders;
 use crate::session_identity::SessionIdentity;
 use crate::terminal::{Failure, Terminal};
 
@@ -192,6 +193,7 @@ pub(crate) fn write_folder<T>(
     write: impl FnOnce(&Path) -> Result<T, Failure>,
 ) -> Result<T, Failure> {
     let failed = |error: io::Error| format!("{}: {error}", out.display());
+    let _new = NewFolders::to(out);
     // The folder itself where `out` is a link to it or ends in `..`, as only that can be renamed.
     let target = out.canonicalize().unwrap_or_else(|_| out.to_owned());
     let is_there = target.is_dir();

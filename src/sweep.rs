@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use bench::{AccuracyCheck, Campaign, Outcome, Shard, SweepOptions, SweepPlan, SweepResult};
+use bench::{AccuracyCheck, Campaign, MAX_TRIALS, Outcome, Shard, SweepOptions, SweepPlan, SweepResult};
 use clap::Args;
 use scenario::Scenario;
 use serde::Serialize;
 
 use crate::html_report::write_sweep;
+use crate::new_folders::NewFolders;
 use crate::shard::{ShardChoice, locked};
 use crate::terminal::{Failure, INTERRUPTED, Terminal, table};
 use crate::{sweep_summary, sweep_table};
@@ -60,9 +61,6 @@ pub(crate) struct Arguments {
 /// More threads than any machine of ours has cores; a typing error beyond.
 const MAX_JOBS: i64 = 1024;
 
-/// More than a year of any scenario; a typing error beyond.
-const MAX_TRIALS: u64 = 100_000_000;
-
 /// Exit code when accuracy has moved, as of `yair evaluate --max-drift`.
 const MOVED: u8 = 3;
 
@@ -95,6 +93,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         _ => None,
     };
     let shard = arguments.shard.map_or(Ok(Shard::WHOLE), |shard| shard.resolved(terminal))?;
+    let _new = arguments.out.as_deref().map(NewFolders::to);
     // Until the results stand.
     let _lock = match &arguments.out {
         Some(out) => {
@@ -190,17 +189,22 @@ fn conclude(
     Ok(if moved { ExitCode::from(MOVED) } else { ExitCode::SUCCESS })
 }
 
+/// A z for people.
+fn shown_z(z: f64, decimals: usize) -> String {
+    if z.is_finite() { format!("{z:.decimals$}") } else { "no number".to_owned() }
+}
+
 /// Most lines that a person reads of what changed.
 const MAX_SHOWN: usize = 20;
 
 fn show_check(check: &AccuracyCheck, update: bool, terminal: &Terminal) -> Result<(), Failure> {
     terminal.say(&format!(
-        "accuracy: {} numbers compared, {} moved beyond |z| = {:.2} (one false positive in {:.0} comparisons); largest |z| = {:.2}",
+        "accuracy: {} numbers compared, {} moved beyond |z| = {:.2} (one false positive in {:.0} comparisons); largest |z| = {}",
         check.compared,
         check.moved.len(),
         check.z_limit,
         1.0 / check.false_alarm_budget,
-        check.largest_z
+        shown_z(check.largest_z, 2)
     ))?;
     let shown = if update { &check.changed } else { &check.moved };
     if shown.is_empty() {
@@ -215,7 +219,7 @@ fn show_check(check: &AccuracyCheck, update: bool, terminal: &Terminal) -> Resul
             number.statistic.to_owned(),
             format!("{:.4e}", number.was),
             format!("{:.4e}", number.is),
-            format!("{:.1}", number.z),
+            shown_z(number.z, 1),
         ]);
     }
     terminal.say(&rows.to_string())?;

@@ -88,10 +88,16 @@ impl Terminal {
         }
         let stop = Arc::new(AtomicBool::new(false));
         if on_ctrl_c {
-            let flag = Arc::clone(&stop);
+            let (flag, quiet) = (Arc::clone(&stop), self.quiet);
             let _ = ctrlc::set_handler(move || {
                 if flag.swap(true, Ordering::Relaxed) {
                     std::process::exit(INTERRUPTED.into());
+                }
+                if !quiet {
+                    let _ = writeln!(
+                        anstream::stderr(),
+                        "stopping when what is under way is done; Ctrl-C again ends at once"
+                    );
                 }
             });
         }
@@ -225,9 +231,13 @@ const WARNING: Style = AnsiColor::Yellow.on_default().effects(Effects::BOLD);
 
 /// What the system says of a mistaken path, as a person would: every reader of files ends here.
 fn in_plain_words(message: &str) -> String {
-    const WORDS: [(&str, &str); 3] = [
+    const WORDS: [(&str, &str); 4] = [
         ("Is a directory (os error 21)", "it is a folder, where a file belongs"),
         ("Not a directory (os error 20)", "a part of this path is a file, where a folder belongs"),
+        (
+            "Directory not empty (os error 39)",
+            "another process has written there meanwhile; nothing was written: choose another name",
+        ),
         ("entity not found", "there is no folder in which it could be made"),
     ];
     WORDS.iter().fold(message.to_owned(), |message, (system, plain)| message.replace(system, plain))
@@ -278,8 +288,28 @@ pub(crate) fn is_dataset(path: &Path) -> bool {
     path.join("dataset.toml").exists()
 }
 
+/// What to do with a file where a dataset, which is a folder, belongs.
+fn not_imported(path: &Path) -> String {
+    let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_lowercase();
+    let (format, robot) = match &ending[..] {
+        "toml" => return format!("{}: it is a file; a dataset is the folder of a dataset.toml", path.display()),
+        "mcap" | "db3" => ("ros2", " --wheel METRES --base METRES"),
+        "tuple" => ("censi", ""),
+        "tum" => ("tum", " --odometry FILE --wheel METRES --base METRES"),
+        _ => ("csv", " --wheel METRES --base METRES"),
+    };
+    let (place, out) = (path.display(), path.with_extension(""));
+    format!(
+        "{place}: it is a file, and no dataset; import it first: yair import {format} {place} --out {}{robot}",
+        out.display()
+    )
+}
+
 /// A dataset, or those in a folder of datasets, by name.
 fn datasets_in(path: &Path) -> Result<Vec<PathBuf>, Failure> {
+    if path.is_file() {
+        return Err(not_imported(path).into());
+    }
     if !path.is_dir() || is_dataset(path) {
         return Ok(vec![path.to_owned()]);
     }

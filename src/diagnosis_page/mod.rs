@@ -9,6 +9,7 @@ use std::path::Path;
 
 use diagnose::{Alternative, Document, Residuals, Status, Verdict};
 
+use crate::plain_text::{markdown, printable};
 use crate::simulate::write_whole;
 use crate::terminal::Failure;
 use pictures::{Picture, pictures};
@@ -44,9 +45,9 @@ impl Page<'_> {
             calib::Names::One(name) => name.clone(),
             calib::Names::Several(names) => names.join(", "),
         };
-        writeln!(page, "# Diagnosis of {names}\n\n{}\n", words::verdict(self.document))?;
+        writeln!(page, "# Diagnosis of {}\n\n{}\n", markdown(&names), markdown(&words::verdict(self.document)))?;
         if let Some(subsample) = &self.document.subsample {
-            writeln!(page, "{}.\n", words::capitalised(&subsample.sentence))?;
+            writeln!(page, "{}.\n", markdown(&words::capitalised(&subsample.sentence)))?;
         }
         self.findings(page)?;
         self.residuals(page, pictures)?;
@@ -68,7 +69,7 @@ impl Page<'_> {
         )?;
         for finding in &self.document.findings {
             let others = if finding.names.len() > 1 { finding.names[1..].join(", ") } else { "–".to_owned() };
-            let what = words::meaning(finding).replace('|', "\\|");
+            let what = markdown(&words::meaning(finding));
             writeln!(page, "| `{}` | {others} | {:.2} | {:.1} | {what} |", finding.id, finding.probability, finding.z)?;
         }
         writeln!(page)?;
@@ -83,14 +84,15 @@ impl Page<'_> {
                 score.high
             )?;
         } else if let Some(why) = &self.document.gain_why_null {
-            writeln!(page, "No gain is stated: {why}.\n")?;
+            writeln!(page, "No gain is stated: {}.\n", markdown(why))?;
         }
         Ok(())
     }
 
     fn residuals(&self, page: &mut String, pictures: &[Picture]) -> std::fmt::Result {
         writeln!(page, "## Residuals\n")?;
-        let matter: Vec<&str> = that_matter(self.residuals).iter().map(|against| &against.label[..]).collect();
+        // A covariate of a dataset has whatever name its file gives it.
+        let matter: Vec<String> = that_matter(self.residuals).iter().map(|against| markdown(&against.label)).collect();
         if self.document.verdict == Verdict::Consistent {
             writeln!(
                 page,
@@ -102,7 +104,7 @@ impl Page<'_> {
             writeln!(page, "Residuals of the calibrated{extended} against {}:\n", matter.join(", "))?;
         }
         for (stem, alt, _) in pictures.iter().filter(|(stem, ..)| *stem == "residuals") {
-            writeln!(page, "![{alt}]({stem}.svg)\n")?;
+            writeln!(page, "![{}]({stem}.svg)\n", markdown(alt))?;
         }
         if !self.residuals.by_covariate.is_empty() {
             writeln!(
@@ -130,7 +132,7 @@ impl Page<'_> {
             writeln!(
                 page,
                 "| {} | {answer} | {:.2} | {} |",
-                words::question(check),
+                markdown(&words::question(check)),
                 check.statistic,
                 words::p_value(check.p_value)
             )?;
@@ -193,7 +195,7 @@ impl Page<'_> {
                         )
                     },
                 );
-                writeln!(page, "| `{}` | {} | {} |", blind.id, size.trim_end(), blind.why)?;
+                writeln!(page, "| `{}` | {} | {} |", blind.id, size.trim_end(), markdown(&blind.why))?;
             }
             writeln!(page, "\nDetection limits: power 0.9 at a false-positive rate of 1e-3.\n")?;
         }
@@ -218,21 +220,21 @@ impl Page<'_> {
         writeln!(page, "## Next experiment\n")?;
         let Some(next) = &self.document.next_experiment else {
             let why = self.document.next_experiment_why_null.as_deref().unwrap_or("none was sought");
-            return writeln!(page, "None: {why}.\n");
+            return writeln!(page, "None: {}.\n", markdown(why));
         };
-        writeln!(page, "{}\n", words::capitalised(&next.why))?;
+        writeln!(page, "{}\n", markdown(&words::capitalised(&next.why)))?;
         writeln!(page, "| effect | predicts |\n| --- | --- |")?;
         for (id, prediction) in &next.predicts {
-            writeln!(page, "| `{id}` | {prediction} |")?;
+            writeln!(page, "| `{id}` | {} |", markdown(prediction))?;
         }
         writeln!(page)?;
         for (stem, alt, _) in pictures.iter().filter(|(stem, ..)| *stem == "next-experiment") {
-            writeln!(page, "![{alt}]({stem}.svg)\n")?;
+            writeln!(page, "![{}]({stem}.svg)\n", markdown(alt))?;
         }
         writeln!(
             page,
             "```toml\n{}\n```\n\n`yair plan` seeks it in another room or time (`--room X,Y --minutes M`).\n",
-            next.protocol.trim_end()
+            printable(next.protocol.trim_end()).replace("```", "`")
         )
     }
 
@@ -246,7 +248,7 @@ impl Page<'_> {
                 writeln!(page, "| `{name}` | {found} | {sigma} |")?;
             }
             for unobservable in &method.not_observable {
-                writeln!(page, "\nNot observable: {} – {}", unobservable.parameter, unobservable.why)?;
+                writeln!(page, "\nNot observable: {} – {}", unobservable.parameter, markdown(&unobservable.why))?;
             }
         }
         match (&self.document.extended_model, &self.document.extended_model_why_null) {
@@ -254,7 +256,7 @@ impl Page<'_> {
                 page,
                 "\nThe robot as found, with its effects, is [extended.toml](extended.toml): `yair simulate` drives it."
             ),
-            (None, Some(why)) => writeln!(page, "\nThere is no extended scenario: {why}."),
+            (None, Some(why)) => writeln!(page, "\nThere is no extended scenario: {}.", markdown(why)),
             (None, None) => Ok(()),
         }
     }

@@ -49,7 +49,7 @@ pub(crate) fn gain(document: &Document) -> Option<String> {
         )
     } else if high < 0.0 {
         format!(
-            "On runs that it was not fitted to, dead reckoning drifts **more** with the extended model: {becomes}. It explains what the instrument measured, and is not to be used for odometry."
+            "On runs that it was not fitted to, dead reckoning drifts more with the extended model: {becomes}. It explains what the instrument measured, and is not to be used for odometry."
         )
     } else {
         format!(

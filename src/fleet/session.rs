@@ -4,11 +4,11 @@ use std::path::Path;
 
 use ::diagnose::Options;
 use ::fleet::{ExcessDrift, GeometryEstimate, SessionDrift, SessionFinding, SessionResult};
-use calib::methods::joint::Joint;
+use calib::methods::joint::{Joint, LargeCalibrationError};
 use calib::{CalibrationReport, Method, MethodReport, Names, evaluate, path_kind};
 use estimation::refuse_wrapped_counters;
 
-use crate::calibrate::why_no_result;
+use crate::calibrate::{large_datasets, why_no_result};
 use crate::check;
 use crate::terminal::folder_name;
 
@@ -27,7 +27,15 @@ pub(super) fn analyse(path: &Path, calibrate_only: bool) -> Result<SessionResult
     let [dataset] = &datasets;
     let sessions = [dataset.session()];
     refuse_wrapped_counters(&sessions).map_err(|error| error.to_string())?;
-    let outcome = Joint::DEFAULT.calibrate(&sessions);
+    // As yair calibrate does it: numbers of one log are the same in both.
+    let outcome = match large_datasets(&[path.to_owned()]).map_err(|failure| failure.to_string())? {
+        Some(mut blocks) => match Joint::DEFAULT.calibrate_large(&mut blocks, |_, _| ()) {
+            Ok(found) => Ok(found),
+            Err(LargeCalibrationError::Calib(error)) => Err(error),
+            Err(error) => return Err(error.to_string()),
+        },
+        None => Joint::DEFAULT.calibrate(&sessions),
+    };
     let mut report = MethodReport::new(Joint::DEFAULT.name(), &outcome, &dataset.robot);
     report.withhold_undetermined(true);
     let calibration = outcome.map_err(|error| error.to_string())?;
@@ -38,13 +46,13 @@ pub(super) fn analyse(path: &Path, calibrate_only: bool) -> Result<SessionResult
         report.parameters.get(parameter.key()).is_some_and(|reported| reported.value.is_some())
     };
     let geometry = GeometryEstimate::of(&calibration, is_determined);
-    let excess_drift = ExcessDrift::of(&sessions[0], &calibration, &geometry);
     let named = CalibrationReport {
         dataset: Names::One(sessions[0].name.to_owned()),
         trained_on: Vec::new(),
         methods: vec![report],
     };
     let nominal = evaluate(&sessions, None, false);
+    let excess_drift = ExcessDrift::of(&sessions[0], &calibration, &geometry, nominal.drift_percent);
     let calibrated = named.calibrations().pop().map(|calibration| evaluate(&sessions, Some(&calibration), false));
     let drift_percent = SessionDrift {
         nominal: nominal.drift_percent,

@@ -9,10 +9,11 @@ use ::fleet::SessionResult;
 use bench::{BenchError, FolderLock};
 use sha2::{Digest, Sha256};
 
+use crate::new_folders::NewFolders;
 use crate::terminal::{Failure, is_dataset};
 
 /// Counts changes of what is found and kept within a version of the program.
-const GENERATION: u32 = 1;
+const GENERATION: u32 = 2;
 
 /// Longest result that is kept, bytes; some kilobytes are usual.
 const MAX_RESULT_BYTES: u64 = 64 << 20;
@@ -25,11 +26,14 @@ pub(super) struct SessionStore {
     folder: PathBuf,
     out: PathBuf,
     lock: FolderLock,
+    /// Behind the lock, whose file is taken away first.
+    _new: NewFolders,
 }
 
 impl SessionStore {
     /// Takes the folder, which is made where it is not there.
     pub(super) fn open(out: &Path) -> Result<Self, Failure> {
+        let new = NewFolders::to(&out.join("sessions"));
         let lock = FolderLock::take(out).map_err(|error| match error {
             BenchError::InUse { path } => {
                 format!("{path}: another process writes there; wait for it, or give another folder with --out")
@@ -41,7 +45,7 @@ impl SessionStore {
             .map_err(|error| format!("{}: {error}", folder.display()))?;
         atomic_file::remove_leftovers(out);
         atomic_file::remove_leftovers(&folder);
-        Ok(Self { folder, out: out.to_owned(), lock })
+        Ok(Self { folder, out: out.to_owned(), lock, _new: new })
     }
 
     /// What to say where the lock keeps nobody out.

@@ -25,6 +25,7 @@ use dataset::Dataset;
 use report_page::{MadeBy, Report};
 
 use crate::command_line;
+use crate::new_folders::NewFolders;
 use crate::simulate::write_whole;
 use crate::terminal::Failure;
 
@@ -43,6 +44,7 @@ pub(crate) fn refuse_file(out: Option<&Path>) -> Result<(), Failure> {
 
 /// Writes the page into a folder, which is made where it is not there.
 fn write(report: &Report, out: &Path) -> Result<(), Failure> {
+    let _new = NewFolders::to(out);
     std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
     write_whole(&out.join(FILE), report.render()?.as_bytes())
 }

@@ -243,6 +243,11 @@ fn a_calibration_file_that_is_none_names_the_known_keys() {
         ("wheel_separation_mm = 363", "known: left_wheel_diameter_m, right_wheel_diameter_m, wheel_separation_m"),
         ("wheel_separation_m = -1", "wheel_separation_m = -1"),
         ("wheel_separation_m = nan", "wheel_separation_m = NaN"),
+        ("wheel_separation_m = 1e308", "wheel_separation_m = 1e308"),
+        ("wheel_separation_m = 5e-324", "wheel_separation_m = 5e-324"),
+        ("latency_s = inf", "latency_s = inf"),
+        ("wheel_separation_m = { value = 0.3, sigma = nan }", "c.toml:4: not a calibration: NaN where 0 or a number"),
+        ("wheel_separation_m = { value = 0.3, ratio_to_nominal = -inf }", "-inf where a number from 1e-60 to 1e60"),
         ("wheel_separation_m = \"wide\"", "c.toml:4: not a calibration"),
     ] {
         let text = format!("[[methods]]\nmethod = \"x\"\n[methods.parameters]\n{parameters}\n");
@@ -376,4 +381,24 @@ fn a_counter_that_leaves_its_place_for_one_row_is_refused_and_the_row_named() {
     let ended = run_in(at, &["calibrate", "set", "--quiet"]);
     assert_eq!((ended.code, ended.stdout.as_str()), (Some(1), ""));
     contains(&ended.stderr, "run \"a\": the left counter shows 4000000000 at t = 40 s and comes back in the next row");
+}
+
+/// What belongs to another command is sent there.
+#[test]
+fn a_manifest_is_no_calibration_and_a_table_is_imported_first() {
+    let temp = tempfile::tempdir().expect("a folder");
+    let at = temp.path();
+    small_set(at);
+    let message = refused(at, &["evaluate", "set", "--calibration", "set/dataset.toml"]);
+    contains(&message, "set/dataset.toml: it is the manifest of a dataset, and no calibration");
+    contains(&message, "yair calibrate DATASET --out FILE");
+    contains(&refused(at, &["export", "c", "set/dataset.toml"]), "the manifest of a dataset");
+    fs::write(at.join("wide.csv"), "t,left,right,x,y,theta\n").expect("written");
+    for command in ["calibrate", "evaluate", "check", "diagnose"] {
+        let message = refused(at, &[command, "wide.csv"]);
+        contains(&message, "import it first: yair import csv wide.csv --out wide --wheel METRES --base METRES");
+    }
+    fs::write(at.join("drive.mcap"), "").expect("written");
+    contains(&refused(at, &["calibrate", "drive.mcap"]), "yair import ros2 drive.mcap --out drive");
+    contains(&refused(at, &["calibrate", "set/dataset.toml"]), "a dataset is the folder of a dataset.toml");
 }

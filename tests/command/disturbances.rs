@@ -48,6 +48,10 @@ fn a_full_disk_is_said_and_what_was_there_stays() {
         &format!("diagnose {robot} --out found --quiet"),
         &format!("correct {robot} --calibration c.toml --out poses --quiet"),
         "export c c.toml --out model.h --force --quiet",
+        // Folders that are made for results, and would be empty.
+        &format!("evaluate {robot} --out-dir drift --quiet"),
+        &format!("calibrate {robot} --out-dir page/of/it --quiet"),
+        "reproduce --trials 2 --out paper --quiet",
         &sweep,
     ] {
         // No file grows beyond two kilobytes, or four where a block of the shell has 1024 bytes; without the

@@ -1,5 +1,6 @@
 //! `yair fleet`: sessions grouped by robot, changes and ranks, what fails, and what the next call reuses.
 
+use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
@@ -187,4 +188,102 @@ fn a_folder_without_datasets_a_wrong_rate_and_a_folder_in_use_are_refused() {
     fs::rename(at.join("a/b/set"), at.join("deep/1/2/set")).expect("moved");
     assert!(refusal(at, &["fleet", "deep"]).contains("two folders below"));
     assert_eq!(entries(&document(at, &["fleet", "deep/1", "--calibrate-only"]), "robots").len(), 1);
+}
+
+/// One long log, which is calibrated part by part: rows at 50 Hz for three hours, and a pose every two
+/// seconds. The robot drives in bends to both sides with a separation 1 % above the stated one.
+fn long_log(at: &Path) {
+    const PER_M: f64 = 4096.0 / (std::f64::consts::PI * 0.15);
+    fs::create_dir(at).expect("made");
+    let robot = "left_wheel_diameter_m = 0.15\nright_wheel_diameter_m = 0.15\nwheel_separation_m = 0.3\nticks_per_rev = 4096.0\n";
+    fs::write(at.join("dataset.toml"), format!("format = 1\n[robot]\n{robot}[[run]]\nid = \"a\"\n")).expect("written");
+    let (mut odometry, mut truth) =
+        ("run,t_s,left_ticks,right_ticks\n".to_owned(), "run,t_s,x_m,y_m,theta_rad\n".to_owned());
+    let (mut x_m, mut y_m, mut theta_rad, mut arcs_m) = (0.0_f64, 0.0_f64, 0.0_f64, [0.0, 0.0]);
+    for row in 0..530_000_u32 {
+        let t_s = 0.02 * f64::from(row);
+        let (distance_m, turn_rad) = (0.005, 0.02 * 0.4 * (0.3 * t_s).sin());
+        if row > 0 {
+            let middle_rad = theta_rad + 0.5 * turn_rad;
+            (x_m, y_m) = (x_m + distance_m * middle_rad.cos(), y_m + distance_m * middle_rad.sin());
+            theta_rad += turn_rad;
+            arcs_m = [arcs_m[0] + distance_m - 0.1515 * turn_rad, arcs_m[1] + distance_m + 0.1515 * turn_rad];
+        }
+        let [left, right] = arcs_m.map(|arc_m| (PER_M * arc_m).round());
+        writeln!(odometry, "a,{t_s:.2},{left},{right}").expect("a text");
+        if row % 100 == 0 {
+            writeln!(truth, "a,{t_s:.2},{x_m:.3},{y_m:.3},{theta_rad:.3}").expect("a text");
+        }
+    }
+    fs::write(at.join("odometry.csv"), odometry).expect("written");
+    fs::write(at.join("truth.csv"), truth).expect("written");
+}
+
+/// What is too large for one fit was fitted as a whole by one command and part by part by the other.
+#[test]
+fn a_long_log_has_the_same_numbers_in_fleet_and_calibrate() {
+    let temp = tempfile::tempdir().expect("a temporary folder");
+    let at = temp.path();
+    long_log(&at.join("long"));
+    let calibrated = document(at, &["calibrate", "long"]);
+    let of = document(at, &["fleet", "long", "--calibrate-only"]);
+    assert!(!calibrated["methods"][0]["one_step"].is_null(), "it is no large log");
+    for key in ["left_wheel_diameter_m", "right_wheel_diameter_m", "wheel_separation_m"] {
+        let (calibrated, of) = (&calibrated["methods"][0]["parameters"][key], &of["robots"][0]["parameters"][key]);
+        assert_eq!((&of["value"], &of["sigma"]), (&calibrated["value"], &calibrated["sigma"]), "{key}");
+        assert!(of["sigma"].is_f64());
+    }
+}
+
+/// What is kept is a file that anybody may have changed: with a wheel of 1e308 m the page had "inf ± 0.045".
+#[test]
+fn a_kept_session_with_numbers_of_no_robot_is_found_anew() {
+    let temp = tempfile::tempdir().expect("a temporary folder");
+    let at = temp.path();
+    session(at, "set", "1", "11", &[]);
+    let arguments = ["fleet", "set", "--calibrate-only", "--out", "kept", "--html", "page.html", "--json"];
+    succeed(at, &arguments);
+    let kept = fs::read_dir(at.join("kept/sessions")).expect("kept").next().expect("one").expect("readable").path();
+    let text = fs::read_to_string(&kept).expect("read");
+    let page = fs::read_to_string(at.join("page.html")).expect("written");
+    let changed = |of: &Value, at: &str, value: Value| {
+        let mut changed = of.clone();
+        *changed.pointer_mut(at).unwrap_or_else(|| panic!("no {at} in {of}")) = value;
+        changed.to_string()
+    };
+    let of: Value = serde_json::from_str(&text).expect("JSON");
+    for (place, value) in [
+        ("/geometry/value_m/0", 1e308),
+        ("/geometry/value_m/0", -0.1),
+        ("/geometry/covariance_m2/0/0", 1e308),
+        ("/nominal/wheel_separation_m", 1e308),
+        ("/nominal/wheel_separation_m", 0.0),
+        ("/drift_percent/nominal", f64::MAX),
+        ("/excess_drift/Ok/percent", -1.0),
+        ("/excess_drift/Ok/sigma_percent", 1e308),
+        ("/excess_drift/Ok/p_value", 2.0),
+    ] {
+        fs::write(&kept, changed(&of, place, value.into())).expect("written");
+        let again = succeed(at, &arguments);
+        assert!(again.stderr.contains("1 datasets computed, 0 reused"), "{place} = {value}: {}", again.stderr);
+        assert_eq!(fs::read_to_string(&kept).expect("read"), text);
+        assert_eq!(fs::read_to_string(at.join("page.html")).expect("written"), page);
+    }
+    assert!(succeed(at, &arguments).stderr.contains("0 datasets computed, 1 reused"));
+}
+
+/// Odometry that misses the truth by a little cannot be saved more than that.
+#[test]
+fn an_excess_is_not_above_the_drift() {
+    let temp = tempfile::tempdir().expect("a temporary folder");
+    let at = temp.path();
+    fleet(at);
+    let found = document(at, &["fleet", "robots", "--calibrate-only"]);
+    for robot in entries(&found, "robots") {
+        let latest = entries(robot, "sessions").last().expect("a session");
+        let drift = latest["drift_percent"]["nominal"].as_f64().expect("a drift");
+        if let Some(excess) = robot["excess_drift_percent"]["value"].as_f64() {
+            assert!(excess <= drift, "{excess} {drift}");
+        }
+    }
 }

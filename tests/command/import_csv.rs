@@ -232,6 +232,28 @@ fn speeds_of_wheels_and_twists_calibrate_as_the_dataset() {
     imported(at, &["turns.csv"], &[]);
     same(at, "new", "direct");
 
+    // Of a quaternion with a component that is none, or far from all rotations, there is no heading, as of an
+    // empty cell: with qz = inf it was 135° for whatever was meant.
+    let headings = |bad: &str| {
+        let text = fs::read_to_string(at.join("turns.csv")).expect("read");
+        let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+        let mut cells: Vec<&str> = lines[2].split(',').collect();
+        cells[7] = bad;
+        lines[2] = cells.join(",");
+        fs::write(at.join("odd.csv"), lines.join("\n") + "\n").expect("written");
+        imported(at, &["odd.csv"], &[]);
+        let truth = fs::read_to_string(at.join("new/truth.csv")).expect("read");
+        let theta = |row: &str| row.rsplit(',').next().is_some_and(|cell| !cell.is_empty());
+        truth.lines().skip(1).map(theta).collect::<Vec<_>>()
+    };
+    let whole = headings("0");
+    assert!(whole.iter().all(|has| *has), "{whole:?}");
+    for bad in ["", "inf", "-inf", "nan", "1e200", "-1e154", "1e400", "3"] {
+        let found = headings(bad);
+        assert_eq!(found.iter().filter(|has| !**has).count(), 1, "{bad}: {found:?}");
+        assert!(!found[1], "{bad}: {found:?}");
+    }
+
     // Of the instant: each interval's mean is that of its ends.
     imported(at, &["motors.csv", "mocap.csv"], &["--rates", "instantaneous"]);
     let odometry = fs::read_to_string(at.join("new/odometry.csv")).expect("read");

@@ -91,6 +91,30 @@ fn a_diagnosis_that_is_interrupted_leaves_no_folder() {
     assert!(!here.join("found").exists(), "{:?}", everything_in(here));
 }
 
+/// What is under way may take half a minute; who asked for the end is answered before.
+#[test]
+fn a_sweep_answers_ctrl_c_at_once() {
+    let temp = tempfile::tempdir().expect("a folder");
+    let here = temp.path();
+    let scenario = concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/noise-levels.toml");
+    let mut child = Command::new("env")
+        .args(["--default-signal=INT", env!("CARGO_BIN_EXE_yair")])
+        .current_dir(here)
+        .args(["sweep", scenario, "--trials", "400", "--out", "sweep"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("yair starts");
+    while !here.join("sweep/sweep.state.json").exists() && child.try_wait().expect("it can be asked").is_none() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill");
+    assert!(sent.success());
+    let said = String::from_utf8(child.wait_with_output().expect("it ends").stderr).expect("UTF-8");
+    let (answered, stopped) = (said.find("stopping when"), said.find("stopped after"));
+    assert!(answered.is_some() && answered < stopped, "{said}");
+}
+
 #[test]
 fn a_sweep_that_is_interrupted_has_no_results_and_goes_on() {
     let temp = tempfile::tempdir().expect("a folder");

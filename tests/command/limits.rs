@@ -199,6 +199,25 @@ fn no_command(place: &str, text: &str) {
     assert!(bad.is_empty(), "{place}: {bad:?} in {text}");
 }
 
+/// The places of docs/reliability.md where texts of files are shown.
+fn documented_places() -> Vec<String> {
+    let document = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/reliability.md")).expect("read");
+    let section =
+        document.split("\n## ").find(|of| of.starts_with("Where texts of files are shown")).expect("a section");
+    let rows = section.lines().filter(|line| line.starts_with('|')).skip(2);
+    rows.map(|row| row.split('|').nth(1).expect("a place").trim().to_owned()).collect()
+}
+
+/// HTML that nobody wrote into the page.
+fn no_markup(place: &str, text: &str) {
+    for markup in ["<script>alert", "<script>", "<b>", "<img"] {
+        assert!(!text.contains(markup), "{place}: {markup} in {text}");
+    }
+}
+
+/// A sink with the check that no text is more than text there.
+type Sink<'t> = (&'t str, Box<dyn Fn(&Path) + 't>);
+
 #[test]
 fn texts_of_files_are_texts_wherever_they_are_shown() {
     let temp = tempfile::tempdir().expect("a temporary folder");
@@ -206,40 +225,79 @@ fn texts_of_files_are_texts_wherever_they_are_shown() {
     dataset(at, "set", HOSTILE, ["=1+1", "<b>run</b>"]);
     let manifest = fs::read_to_string(at.join("set/dataset.toml")).expect("there");
     let with_id = manifest.replace("[robot]\n", "[robot]\nid = \"=cmd|'/C calc'!A0<script>alert(2)</script>\"\n");
-    write(at, "set/dataset.toml", with_id);
+    // A quantity of the runs has the name that its key gives it.
+    let key = "\"<img src=x>[a](b)\u{202e}`_kg\"";
+    let with_key = with_id.replace("[[run]]\n", &format!("[[run]]\n{key} = 1.5\n")).replacen("= 1.5", "= 2.5", 1);
+    write(at, "set/dataset.toml", with_key);
     let all = |ended: &Ended| ended.stdout.clone() + &ended.stderr;
     succeed(at, &["calibrate", "set", "--out", "found.toml"]);
-    let commands: [&[&str]; 6] = [
+    let commands: [&[&str]; 7] = [
         &["check", "set"],
         &["calibrate", "set", "--out-dir", "pages"],
         &["evaluate", "set", "--calibration", "found.toml", "--out-dir", "drift"],
         &["evaluate", "set", "--json"],
         &["fleet", "set", "--calibrate-only", "--csv", "fleet.csv", "--html", "fleet.html"],
+        &["diagnose", "set", "--out", "diagnosis"],
         &["export", "tum", "set", "--out", "tum", "--force"],
     ];
-    for command in commands {
-        let ended = run_in(at, command);
-        no_command(&command.join(" "), &all(&ended));
-        assert!(!all(&ended).contains("panicked"), "{}", ended.stderr);
-    }
-    for page in ["pages/report.html", "drift/report.html", "fleet.html"] {
-        let text = fs::read_to_string(at.join(page)).expect("a page");
-        assert!(!text.contains("<script>alert") && !text.contains("<b>run</b>"), "{page}");
-        assert!(
-            text.contains("&lt;script&gt;") || text.contains("&#60;script&#62;") || text.contains("\\u003cscript"),
-            "{page}"
-        );
-    }
-    let table = fs::read_to_string(at.join("fleet.csv")).expect("a table");
-    let mut rows = csv::Reader::from_reader(table.as_bytes());
-    for cell in rows.records().flat_map(|row| row.expect("a row").iter().map(str::to_owned).collect::<Vec<_>>()) {
-        assert!(!cell.starts_with(['=', '+', '@']), "{cell}");
-    }
-    let header = succeed(at, &["export", "c", "found.toml"]).stdout;
-    assert_eq!(header.matches("/*").count(), header.matches("*/").count());
-    assert!(!header.contains("*/ int evil"), "{header}");
-    let yaml = succeed(at, &["export", "ros2-yaml", "found.toml"]).stdout;
-    yaml_rust2::YamlLoader::load_from_str(&yaml).expect("YAML");
+    let printed: String = commands
+        .iter()
+        .map(|command| {
+            let ended = run_in(at, command);
+            assert!(!all(&ended).contains("panicked"), "{}", ended.stderr);
+            all(&ended)
+        })
+        .collect();
+    let read = |file: &str| fs::read_to_string(at.join(file)).expect("written");
+    let sinks: [Sink<'_>; 5] = [
+        ("terminal", Box::new(|_| no_command("terminal", &printed))),
+        (
+            "tables for people (`fleet --csv`)",
+            Box::new(|_| {
+                let mut rows = csv::Reader::from_path(at.join("fleet.csv")).expect("a table");
+                for row in rows.records().map(|row| row.expect("a row")) {
+                    assert!(row.iter().all(|cell| !cell.starts_with(['=', '+', '@'])), "{row:?}");
+                }
+            }),
+        ),
+        (
+            "comments of C, Java and YAML; strings of YAML",
+            Box::new(|at| {
+                for format in ["c", "wpilib", "linorobot2"] {
+                    let code = succeed(at, &["export", format, "found.toml"]).stdout;
+                    no_command(format, &code);
+                    assert_eq!(code.matches("/*").count(), code.matches("*/").count(), "{code}");
+                    assert!(!code.contains("*/ int evil"), "{code}");
+                }
+                let yaml = succeed(at, &["export", "ros2-yaml", "found.toml"]).stdout;
+                yaml_rust2::YamlLoader::load_from_str(&yaml).expect("YAML");
+            }),
+        ),
+        (
+            "HTML",
+            Box::new(|_| {
+                for page in ["pages/report.html", "drift/report.html", "fleet.html", "diagnosis/report.html"] {
+                    let text = read(page);
+                    assert!(!text.contains("<script>alert") && !text.contains("<b>run</b>"), "{page}");
+                    let escapes = ["&lt;script&gt;", "&#60;script&#62;", "\\u003cscript"];
+                    assert!(escapes.iter().any(|escape| text.contains(escape)), "{page}");
+                }
+            }),
+        ),
+        (
+            "Markdown (`report.md`)",
+            Box::new(|_| {
+                let text = read("diagnosis/report.md");
+                no_command("report.md", &text);
+                no_markup("report.md", &text);
+                let title = text.lines().next().expect("a title");
+                assert!(title.contains("&lt;script&gt;alert(1)&lt;/script&gt;"), "{title}");
+                assert!(title.contains("\\\\u{202e}") && title.contains("\\|"), "{title}");
+            }),
+        ),
+    ];
+    assert_eq!(documented_places(), sinks.iter().map(|(place, _)| (*place).to_owned()).collect::<Vec<_>>());
+    sinks.iter().for_each(|(_, holds)| holds(at));
     // The id of a run is a file's name only where it is a plain one; nothing is written otherwise.
     assert!(!at.join("tum").exists());
 }

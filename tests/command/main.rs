@@ -14,6 +14,7 @@ mod disturbances;
 mod export;
 mod export_mcap;
 mod fleet;
+mod gates;
 mod good_log;
 mod import_csv;
 mod import_ros2;

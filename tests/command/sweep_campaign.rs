@@ -284,6 +284,48 @@ fn a_killed_command_goes_on_where_it_was() {
     assert_same(&contents(&here.join("whole")), &contents(&here.join("killed")));
 }
 
+/// Gone on with, a place beyond the design was a campaign of a thousand years, and a count beyond its trials
+/// a panic.
+#[test]
+fn a_state_that_its_plan_cannot_have_come_to_is_refused() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let (here, plan) = (temporary.path(), plan(None));
+    run(&plan, here, Shard::WHOLE, 1, false, 2).expect("stopped");
+    let state: serde_json::Value = serde_json::from_slice(&fs::read(here.join(STATE)).expect("a state")).expect("JSON");
+    let resumed = |at: &str, value: serde_json::Value| {
+        let mut changed = state.clone();
+        *changed.pointer_mut(at).unwrap_or_else(|| panic!("no {at} in {state}")) = value;
+        fs::write(here.join(STATE), changed.to_string()).expect("written");
+        // No wave: what is read is written again.
+        run(&plan, here, Shard::WHOLE, 1, true, 0)
+    };
+    assert!(matches!(resumed("/spooled", state["spooled"].clone()), Ok(Outcome::Stopped(_))));
+    let tally = "/open/0/1/chunks/nodes/0/sum/estimates/0";
+    for (at, value) in [
+        ("/next/chunk", 1_u64 << 32),
+        ("/next/point", 1 << 32),
+        ("/end/chunk", 1 << 32),
+        ("/end/point", 1 << 32),
+        ("/first/chunk", 1),
+        ("/open/0/0", 7),
+        ("/open/0/1/look", 1 << 32),
+        ("/open/0/1/chunks/next", 1 << 63),
+        ("/open/0/1/chunks/nodes/0/level", 63),
+        ("/open/0/1/chunks/nodes/0/level", 64),
+        ("/open/0/1/histograms/0/count", u64::MAX),
+        (&format!("{tally}/failures"), u64::MAX),
+        (&format!("{tally}/with_sigma"), 1 << 32),
+        (&format!("{tally}/errors/count"), 1 << 32),
+    ] {
+        let ended = resumed(at, value.into());
+        assert!(matches!(ended, Err(BenchError::NotAState { .. })), "{at} = {value}: {ended:?}");
+    }
+    for (key, value) in [("count", -1.0), ("mean", 1e100), ("m2", -1e-9), ("m4", 1e300), ("m3", -1e300)] {
+        let ended = resumed(&format!("{tally}/errors/{key}"), value.into());
+        assert!(matches!(ended, Err(BenchError::NotAState { .. })), "{key} = {value}: {ended:?}");
+    }
+}
+
 #[test]
 fn what_does_not_fit_together_is_refused_with_the_reason() {
     let temporary = tempfile::tempdir().expect("a folder");

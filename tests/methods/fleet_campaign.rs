@@ -45,7 +45,7 @@ fn session(of_case: &[Scenario], robot: u64, day: u64, changed_case: usize, seed
             path_kind: calib::path_kind(&sessions[0]),
             runs: simulated.runs.len(),
             drift_percent: SessionDrift { nominal: None, calibrated: None, why_null: None },
-            excess_drift: ExcessDrift::of(&sessions[0], &calibration, &geometry),
+            excess_drift: ExcessDrift::of(&sessions[0], &calibration, &geometry, None),
             geometry,
             findings: None,
             remarks: Vec::new(),

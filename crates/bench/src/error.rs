@@ -27,6 +27,14 @@ pub enum BenchError {
         /// How many were asked for.
         trials: u64,
     },
+    /// More trials than a campaign of years has.
+    #[error("{trials} trials at a point; expected at most {most}")]
+    TooManyTrials {
+        /// How many were asked for.
+        trials: u64,
+        /// The limit.
+        most: u64,
+    },
     /// The scenario's points are not scenarios.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),

@@ -18,7 +18,7 @@ pub use error::BenchError;
 pub use moments::Moments;
 pub use sweep::{
     AccuracyCheck, Campaign, Comparison, Coverage, DriftResult, EstimatorResult, FALSE_ALARM_BUDGET, FolderLock,
-    Merged, MethodCost, Outcome, PointResult, Progress, Quantile, Shard, SweepOptions, SweepPlan, SweepResult, TRACKED,
-    can_be_written, compare, merge, read_baseline, write_merged, write_results,
+    MAX_TRIALS, Merged, MethodCost, Outcome, PointResult, Progress, Quantile, Shard, SweepOptions, SweepPlan,
+    SweepResult, TRACKED, can_be_written, compare, merge, read_baseline, write_merged, write_results,
 };
 pub use trial::Trial;

@@ -1,15 +1,21 @@
 //! Running moments to the fourth, mergeable (Pébay 2008): what a Monte-Carlo error of a bias, a variance and
 //! an RMSE needs, in constant memory.
 
+use dataset::{NotNegative, Number, checked};
 use serde::{Deserialize, Serialize};
 
 /// Count, mean and central moments of a sample of errors.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Moments {
+    #[serde(deserialize_with = "checked::<NotNegative, _>")]
     count: f64,
+    #[serde(deserialize_with = "checked::<Number, _>")]
     mean: f64,
+    #[serde(deserialize_with = "checked::<NotNegative, _>")]
     m2: f64,
+    #[serde(deserialize_with = "checked::<Number, _>")]
     m3: f64,
+    #[serde(deserialize_with = "checked::<NotNegative, _>")]
     m4: f64,
 }
 

@@ -10,8 +10,7 @@
 //! (k + 1)/(n + 2) of k in n, so that none in n does not forbid the first. Both tests are one-sided. The
 //! former finds less than the latter where all cases are new, and far more where they are the same.
 
-use std::fs::File;
-use std::io::Read;
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use statrs::distribution::{Binomial, DiscreteCDF};
@@ -21,11 +20,14 @@ use super::error::ChallengeError;
 use super::measure::{is_first_name_right, is_plain};
 use super::result::CaseResult;
 
-/// Longest baseline, bytes; what is longer is cut off, and then no JSON.
+/// Longest baseline, bytes.
 const MAX_BASELINE_BYTES: u64 = 64 << 20;
 
 /// Probability that a whole comparison finds an equally good tool worse.
 pub const FALSE_ALARM_BUDGET: f64 = 0.01;
+
+/// Budgets that a baseline can have: a smaller one would let anything pass.
+const BUDGETS: RangeInclusive<f64> = 1e-6..=0.5;
 
 /// What is guarded: the cases that count, and those of them that fail.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -35,9 +37,9 @@ pub struct Guard {
     pub id: String,
     /// What fails, for people.
     pub what: String,
-    /// Numbers of the cases that count.
+    /// Numbers of the cases that count, ascending.
     pub cases: Vec<u64>,
-    /// Numbers of those that fail.
+    /// Numbers of those that fail, ascending.
     pub failures: Vec<u64>,
 }
 
@@ -131,10 +133,32 @@ impl DiagnosisBaseline {
     /// [`ChallengeError::Baseline`] when it cannot be read or is none.
     pub fn read(path: &Path) -> Result<Self, ChallengeError> {
         let failed = |why: String| ChallengeError::Baseline { path: path.display().to_string(), why };
-        let mut bytes = Vec::new();
-        let file = File::open(path).map_err(|error| failed(format!("{error}; --update writes a baseline")))?;
-        file.take(MAX_BASELINE_BYTES).read_to_end(&mut bytes).map_err(|error| failed(error.to_string()))?;
-        serde_json::from_slice(&bytes).map_err(|error| failed(format!("not a baseline: {error}")))
+        let bytes = atomic_file::read_at_most(path, MAX_BASELINE_BYTES)
+            .map_err(|error| failed(format!("{error}; --update writes a baseline")))?;
+        let baseline: Self =
+            serde_json::from_slice(&bytes).map_err(|error| failed(format!("not a baseline: {error}")))?;
+        baseline.why_none().map_or(Ok(baseline), |why| Err(failed(format!("not a baseline: {why}"))))
+    }
+
+    /// Why it is no campaign that others can be held against.
+    fn why_none(&self) -> Option<String> {
+        if !BUDGETS.contains(&self.false_alarm_budget) {
+            let (least, most) = (BUDGETS.start(), BUDGETS.end());
+            return Some(format!("false_alarm_budget = {:?}; expected {least} to {most}", self.false_alarm_budget));
+        }
+        let ids: Vec<&str> = GUARDS.iter().map(|(id, ..)| *id).collect();
+        if !self.guards.iter().map(|guard| &guard.id[..]).eq(ids.iter().copied()) {
+            return Some(format!("it does not guard {}; --update writes one that does", ids.join(", ")));
+        }
+        // In the order of their numbers, and none twice.
+        let is_sorted = |numbers: &[u64]| numbers.is_sorted_by(|a, b| a < b);
+        let is_of_cases = |guard: &&Guard| {
+            let are_numbers = is_sorted(&guard.cases) && guard.cases.last().is_none_or(|last| *last < self.cases);
+            let is_case = |number: &u64| guard.cases.binary_search(number).is_ok();
+            are_numbers && is_sorted(&guard.failures) && guard.failures.iter().all(is_case)
+        };
+        let odd = self.guards.iter().find(|guard| !is_of_cases(guard))?;
+        Some(format!("{}: its failures are not among its cases, or these not among {}", odd.id, self.cases))
     }
 
     /// Holds a campaign against this one.
@@ -152,7 +176,9 @@ impl DiagnosisCheck {
     /// What got worse, the least likely first.
     #[must_use]
     pub fn worse(&self) -> Vec<&Guarded> {
-        let mut worse: Vec<&Guarded> = self.guarded.iter().filter(|guarded| guarded.p_value < self.level).collect();
+        // A p-value that is no number holds nothing.
+        let holds = |guarded: &&Guarded| guarded.p_value >= self.level;
+        let mut worse: Vec<&Guarded> = self.guarded.iter().filter(|guarded| !holds(guarded)).collect();
         worse.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
         worse
     }
@@ -162,7 +188,8 @@ impl Guarded {
     fn of(was: &Guard, is: &Guard, paired: bool) -> Self {
         let counts = |guard: &Guard| (guard.failures.len(), guard.cases.len());
         let only_in = |a: &Guard, b: &Guard| -> Vec<u64> {
-            let is_new = |number: &&u64| b.cases.contains(number) && !b.failures.contains(number);
+            let is_in = |list: &[u64], number: &u64| list.binary_search(number).is_ok();
+            let is_new = |number: &&u64| is_in(&b.cases, number) && !is_in(&b.failures, number);
             a.failures.iter().filter(is_new).copied().collect()
         };
         let (new_failures, mended) = (only_in(is, was), only_in(was, is));
@@ -186,10 +213,8 @@ impl Guarded {
 
 /// Probability of so many or more.
 fn at_least(count: usize, of: usize, share: f64) -> f64 {
-    match (count.checked_sub(1), Binomial::new(share, of as u64)) {
-        (Some(below), Ok(binomial)) => binomial.sf(below as u64),
-        _ => 1.0,
-    }
+    let Some(below) = count.checked_sub(1) else { return 1.0 };
+    Binomial::new(share, of as u64).map_or(f64::NAN, |binomial| binomial.sf(below as u64))
 }
 
 #[cfg(test)]
@@ -201,6 +226,41 @@ mod tests {
         let guard =
             Guard { id: "a".to_owned(), what: String::new(), cases: (0..of).collect(), failures: failures.collect() };
         DiagnosisBaseline { seed, cases: of, false_alarm_budget: FALSE_ALARM_BUDGET, guards: vec![guard] }
+    }
+
+    #[test]
+    fn what_is_no_campaign_is_no_baseline() {
+        let guard =
+            |id: &str| Guard { id: id.to_owned(), what: String::new(), cases: vec![1, 4, 7], failures: vec![4] };
+        let sound = DiagnosisBaseline {
+            seed: 1,
+            cases: 8,
+            false_alarm_budget: FALSE_ALARM_BUDGET,
+            guards: GUARDS.iter().map(|(id, ..)| guard(id)).collect(),
+        };
+        let temp = tempfile::tempdir().expect("a temporary folder");
+        let read = |change: fn(&mut DiagnosisBaseline)| {
+            let mut changed = sound.clone();
+            change(&mut changed);
+            let path = temp.path().join("baseline.json");
+            std::fs::write(&path, serde_json::to_vec(&changed).expect("JSON")).expect("written");
+            DiagnosisBaseline::read(&path).map_err(|error| error.to_string())
+        };
+        assert_eq!(read(|_| ()), Ok(sound.clone()));
+        let all: [fn(&mut DiagnosisBaseline); 9] = [
+            |of| of.false_alarm_budget = f64::NAN,
+            |of| of.false_alarm_budget = 5e-324,
+            |of| of.false_alarm_budget = -1.0,
+            |of| of.guards.clear(),
+            |of| of.guards[0].id = "other".to_owned(),
+            |of| of.guards[1].failures = vec![5],
+            |of| of.guards[1].failures = vec![4, 4],
+            |of| of.guards[1].cases.swap(0, 1),
+            |of| of.cases = 7,
+        ];
+        for (number, change) in all.into_iter().enumerate() {
+            assert!(read(change).is_err_and(|why| why.contains("not a baseline")), "change {number}");
+        }
     }
 
     #[test]

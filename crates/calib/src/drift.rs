@@ -8,8 +8,8 @@ use dataset::{RunView, Session};
 use kinematics::{Pose, wrap_to_pi};
 use serde::Serialize;
 
+use crate::named_calibration::NamedCalibration;
 use crate::pose_error::{PathErrors, PoseErrorOptions, PoseErrorStatistics, PoseErrors};
-use crate::report::NamedCalibration;
 use crate::trajectory::{AugmentedCalibration, RunPath, Trajectory, at};
 
 /// Drift of every run under one calibration.
@@ -175,6 +175,12 @@ pub fn evaluate_path(
 }
 
 impl CalibrationDrift {
+    /// Whether it drifts by at most so many per cent; a drift that is no number, or not known, does not.
+    #[must_use]
+    pub fn is_at_most(&self, percent: f64) -> bool {
+        self.drift_percent.is_some_and(|drift| drift <= percent)
+    }
+
     /// The drift of runs that were evaluated under one calibration.
     #[must_use]
     pub fn of_runs(calibration: Option<&NamedCalibration>, runs: Vec<RunDrift>) -> Self {

@@ -1,6 +1,6 @@
 //! What a calibration is: the trait of a method and the form of its result.
 
-use dataset::{LANES, NominalRobot, Replicates, Session};
+use dataset::{LANES, NominalRobot, NotNegative, Number, Replicates, Session, checked};
 use kinematics::{DriveGeometry, GeometryError, Pose, Wheels};
 use motion_programs::Schedule;
 use nalgebra::{DMatrix, Matrix3};
@@ -98,12 +98,16 @@ pub struct GroupInstrument {
     pub of: String,
     /// Ahead of the drive's centre, metres; `None`, as the others, where it is common to all or not
     /// observable in these runs.
+    #[serde(default, deserialize_with = "checked::<Option<Number>, _>")]
     pub sensor_x_m: Option<f64>,
     /// To the left of the drive's centre, metres.
+    #[serde(default, deserialize_with = "checked::<Option<Number>, _>")]
     pub sensor_y_m: Option<f64>,
     /// Its heading on the robot, radians.
+    #[serde(default, deserialize_with = "checked::<Option<Number>, _>")]
     pub sensor_theta_rad: Option<f64>,
     /// Latency of its time stamps, seconds.
+    #[serde(default, deserialize_with = "checked::<Option<Number>, _>")]
     pub latency_s: Option<f64>,
 }
 
@@ -112,8 +116,10 @@ pub struct GroupInstrument {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct OdometryNoise {
     /// Of each wheel's travel: one standard deviation is this times the root of the travel, m/√m.
+    #[serde(deserialize_with = "checked::<NotNegative, _>")]
     pub wheel_sigma_m_per_sqrt_m: f64,
     /// Of the heading beyond that of the wheels: this times the root of the turn, rad/√rad.
+    #[serde(deserialize_with = "checked::<NotNegative, _>")]
     pub turn_sigma_rad_per_sqrt_rad: f64,
     /// It is what is usual of robots, and the standard deviations of what was estimated with it: the
     /// measurements are no more than what is fitted to them, so that they show no scatter.
@@ -256,12 +262,14 @@ impl Calibration {
 
 /// Whether a length is no correction of its nominal value, by the ratio of the two.
 pub(crate) fn is_implausible(parameter: Parameter, ratio: f64) -> bool {
-    let most = if parameter == Parameter::WheelSeparation {
-        MAX_PLAUSIBLE_SEPARATION_RATIO
-    } else {
-        MAX_PLAUSIBLE_DIAMETER_RATIO
-    };
-    ratio > most || ratio < 1.0 / most
+    is_off(parameter, ratio, [MAX_PLAUSIBLE_DIAMETER_RATIO, MAX_PLAUSIBLE_SEPARATION_RATIO])
+}
+
+/// Whether a ratio of lengths is beyond the most of diameters or of separations, to either side; what is no
+/// number is.
+pub(crate) fn is_off(parameter: Parameter, ratio: f64, [of_diameters, of_separations]: [f64; 2]) -> bool {
+    let most = if parameter == Parameter::WheelSeparation { of_separations } else { of_diameters };
+    !(1.0 / most..=most).contains(&ratio)
 }
 
 /// Why a method gives no result.

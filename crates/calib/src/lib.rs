@@ -12,6 +12,7 @@ mod dead_reckoning_jacobian;
 mod drift;
 mod drive;
 mod estimate;
+mod named_calibration;
 mod path_covariance;
 mod pose_error;
 mod pose_measurements;
@@ -40,14 +41,14 @@ pub use estimate::{
     Parameter, Rejected,
 };
 pub use methods::{METHODS, method};
+pub use named_calibration::NamedCalibration;
 pub use path_covariance::path_covariances;
 pub use pose_error::{
     ErrorStatistics, PoseErrorOptions, PoseErrorStatistics, PoseErrors, absolute_pose_errors, relative_pose_errors,
 };
 pub use pose_pairs::{Delta, DeltaUnit};
 pub use report::{
-    CalibrationReport, MethodReport, NamedCalibration, Names, ReportError, ReportedBlindness, ReportedRejection,
-    ReportedValue,
+    CalibrationReport, MethodReport, Names, ReportError, ReportedBlindness, ReportedRejection, ReportedValue,
 };
 pub use robust::{MedianMad, Summary};
 pub use stated::nominal_value;

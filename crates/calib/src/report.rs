@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use dataset::NominalRobot;
-use kinematics::{DriveGeometry, Pose, Wheels};
+use dataset::{NominalRobot, NotNegative, Number, OutOfRange, Positive};
 use serde::{Deserialize, Serialize};
 
-use crate::estimate::{CalibError, Calibration, GroupInstrument, OdometryNoise, Parameter, is_implausible};
-use crate::settings::{MAX_EVALUATED_DIAMETER_RATIO, MAX_EVALUATED_SEPARATION_RATIO, MAX_FILE_BYTES};
+use crate::estimate::{CalibError, Calibration, GroupInstrument, OdometryNoise, Parameter};
+use crate::named_calibration::NamedCalibration;
+use crate::settings::MAX_FILE_BYTES;
 use crate::stated::nominal_value;
 use crate::trained_on::TrainedOn;
 use estimation::OneStep;
@@ -118,7 +118,7 @@ pub struct MethodReport {
 
 /// A value with its standard deviation. A bare number is read as a value without one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(from = "ValueOrNumber")]
+#[serde(try_from = "ValueOrNumber")]
 pub struct ReportedValue {
     /// In SI units; `None` where the data do not determine it, with the reason under `not_observable`.
     pub value: Option<f64>,
@@ -148,12 +148,17 @@ enum ValueOrNumber {
     },
 }
 
-impl From<ValueOrNumber> for ReportedValue {
-    fn from(from: ValueOrNumber) -> Self {
+impl TryFrom<ValueOrNumber> for ReportedValue {
+    type Error = OutOfRange;
+
+    fn try_from(from: ValueOrNumber) -> Result<Self, OutOfRange> {
         match from {
-            ValueOrNumber::Number(value) => Self::of(value, None),
+            ValueOrNumber::Number(value) => Ok(Self::of(value, None)),
             ValueOrNumber::Value { value, ratio_to_nominal, sigma, sigma_why_null, interval_95 } => {
-                Self { value: Some(value), ratio_to_nominal, sigma, sigma_why_null, interval_95 }
+                ratio_to_nominal.map(Positive::try_from).transpose()?;
+                sigma.map(NotNegative::try_from).transpose()?;
+                interval_95.into_iter().flatten().try_for_each(|end| Number::try_from(end).map(drop))?;
+                Ok(Self { value: Some(value), ratio_to_nominal, sigma, sigma_why_null, interval_95 })
             }
         }
     }
@@ -276,19 +281,19 @@ impl CalibrationReport {
             ReportError::NotACalibration { place, message: error.message().trim().replace('\n', "; ") }
         })?;
         for method in &report.methods {
-            if let Some((key, value)) = method.parameters.iter().find(|(key, value)| {
-                let length =
+            for (key, value) in method.parameters.iter().filter_map(|(key, value)| Some((key, value.value?))) {
+                let is_length =
                     !Parameter::EXTRINSICS.iter().chain([&Parameter::Latency]).any(|of| of.key() == key.as_str());
-                let value = value.value.unwrap_or(f64::NAN);
-                !KNOWN_KEYS.contains(&key.as_str()) || !value.is_finite() || (length && value <= 0.0)
-            }) {
-                let message = format!(
-                    "[methods.parameters] of {}: {key} = {} is no known value; lengths are positive; known: {}",
-                    method.method,
-                    value.value.unwrap_or(f64::NAN),
-                    KNOWN_KEYS.join(", ")
-                );
-                return Err(ReportError::NotACalibration { place, message });
+                let is_value =
+                    if is_length { Positive::try_from(value).is_ok() } else { Number::try_from(value).is_ok() };
+                if !is_value || !KNOWN_KEYS.contains(&key.as_str()) {
+                    let message = format!(
+                        "[methods.parameters] of {}: {key} = {value:?} is no known value; lengths are positive; known: {}",
+                        method.method,
+                        KNOWN_KEYS.join(", ")
+                    );
+                    return Err(ReportError::NotACalibration { place, message });
+                }
             }
         }
         Ok(report)
@@ -320,89 +325,6 @@ const KNOWN_KEYS: &[&str] = &[
     Parameter::SensorTheta.key(),
     Parameter::Latency.key(),
 ];
-
-/// A named set of values for dead reckoning.
-#[derive(Debug, Clone, PartialEq)]
-pub struct NamedCalibration {
-    /// The name that tables show.
-    pub name: String,
-    /// Values by key.
-    pub values: BTreeMap<String, f64>,
-}
-
-impl NamedCalibration {
-    /// The drive for a robot: missing values stay nominal; a diameter missing beside a travel per tick
-    /// follows from it.
-    #[must_use]
-    pub fn geometry(&self, robot: &NominalRobot, nominal: DriveGeometry) -> Option<DriveGeometry> {
-        let value = |parameter: Parameter| self.values.get(parameter.key()).copied();
-        let diameter_m = |diameter: Parameter, per_tick: Parameter, nominal_m: f64| {
-            let from_ticks = || Some(value(per_tick)? * robot.ticks_per_rev? / std::f64::consts::PI);
-            value(diameter).or_else(from_ticks).unwrap_or(nominal_m)
-        };
-        let nominal_m = nominal.wheel_diameter_m();
-        let diameter_m = Wheels {
-            left: diameter_m(Parameter::LeftWheelDiameter, Parameter::LeftPerTick, nominal_m.left),
-            right: diameter_m(Parameter::RightWheelDiameter, Parameter::RightPerTick, nominal_m.right),
-        };
-        DriveGeometry::new(diameter_m, value(Parameter::WheelSeparation).unwrap_or(nominal.wheel_separation_m())).ok()
-    }
-
-    /// The value that is no correction of a robot's nominal one, for people; `None` where all may be.
-    #[must_use]
-    pub fn implausible_for(&self, robot: &NominalRobot) -> Option<String> {
-        let found = self.geometry(robot, robot.geometry().ok()?)?;
-        let parameters = [
-            (Parameter::LeftWheelDiameter, found.wheel_diameter_m().left, robot.left_wheel_diameter_m),
-            (Parameter::RightWheelDiameter, found.wheel_diameter_m().right, robot.right_wheel_diameter_m),
-            (Parameter::WheelSeparation, found.wheel_separation_m(), robot.wheel_separation_m),
-        ];
-        let off =
-            |&(parameter, found_m, nominal_m): &(Parameter, f64, f64)| is_implausible(parameter, found_m / nominal_m);
-        let (parameter, found_m, nominal_m) = parameters.into_iter().find(off)?;
-        Some(format!("{} is {found_m:.4} where the dataset states {nominal_m:.4}", parameter.key()))
-    }
-
-    /// The value that is far from a robot's nominal one, though it may be a correction of it, for people.
-    #[must_use]
-    pub fn other_robot(&self, robot: &NominalRobot) -> Option<String> {
-        let found = self.geometry(robot, robot.geometry().ok()?)?;
-        let parameters = [
-            (Parameter::LeftWheelDiameter, found.wheel_diameter_m().left, robot.left_wheel_diameter_m),
-            (Parameter::RightWheelDiameter, found.wheel_diameter_m().right, robot.right_wheel_diameter_m),
-            (Parameter::WheelSeparation, found.wheel_separation_m(), robot.wheel_separation_m),
-        ];
-        let off = |&(parameter, found_m, nominal_m): &(Parameter, f64, f64)| {
-            let most = if parameter == Parameter::WheelSeparation {
-                MAX_EVALUATED_SEPARATION_RATIO
-            } else {
-                MAX_EVALUATED_DIAMETER_RATIO
-            };
-            (found_m / nominal_m).ln().abs() > most.ln()
-        };
-        let (parameter, found_m, nominal_m) = parameters.into_iter().find(off)?;
-        Some(format!(
-            "{} is {:.2} mm where the dataset states {:.2} mm",
-            parameter.key(),
-            1e3 * found_m,
-            1e3 * nominal_m
-        ))
-    }
-
-    /// Latency of the outside instrument's time stamps, seconds; 0 unless the calibration has it.
-    #[must_use]
-    pub fn latency_s(&self) -> f64 {
-        self.values.get(Parameter::Latency.key()).copied().unwrap_or(0.0)
-    }
-
-    /// The outside instrument's frame on the robot; the identity unless the calibration has extrinsics.
-    #[must_use]
-    pub fn body_from_sensor(&self) -> Pose {
-        let [x_m, y_m, theta_rad] =
-            Parameter::EXTRINSICS.map(|parameter| self.values.get(parameter.key()).copied().unwrap_or(0.0));
-        Pose::new(x_m, y_m, theta_rad)
-    }
-}
 
 #[cfg(test)]
 mod tests {
@@ -441,14 +363,6 @@ mod tests {
         }
     }
 
-    const ROBOT: NominalRobot = NominalRobot {
-        left_wheel_diameter_m: 0.08,
-        right_wheel_diameter_m: 0.09,
-        wheel_separation_m: 0.2,
-        ticks_per_rev: Some(1000.0),
-        counter_bits: None,
-    };
-
     #[test]
     fn a_calibration_file_reads_back_as_it_was_written() {
         let text = report().to_toml().expect("serialises");
@@ -456,32 +370,26 @@ mod tests {
     }
 
     #[test]
-    fn what_a_calibration_does_not_say_stays_nominal() {
-        let robot = ROBOT;
-        let calibration =
-            NamedCalibration { name: "x".to_owned(), values: [("left_m_per_tick".to_owned(), 3e-4)].into() };
-        let geometry = calibration.geometry(&robot, robot.geometry().expect("valid")).expect("valid");
-        assert_eq!(geometry.wheel_diameter_m().left, 0.3 / std::f64::consts::PI);
-        assert_eq!(geometry.wheel_diameter_m().right, 0.09);
-        assert_eq!(geometry.wheel_separation_m(), 0.2);
-    }
-
-    #[test]
-    fn values_far_from_the_nominal_ones_are_of_another_robot_and_farther_ones_of_none() {
-        let said = |key: &str, value: f64| {
-            let values = BTreeMap::from([(key.to_owned(), value)]);
-            let found = NamedCalibration { name: "x".to_owned(), values };
-            (found.other_robot(&ROBOT).is_some(), found.implausible_for(&ROBOT).is_some())
-        };
-        for (key, nominal_m, limits) in [
-            ("left_wheel_diameter_m", 0.08, [MAX_EVALUATED_DIAMETER_RATIO, 1.3]),
-            ("right_wheel_diameter_m", 0.09, [MAX_EVALUATED_DIAMETER_RATIO, 1.3]),
-            ("wheel_separation_m", 0.2, [MAX_EVALUATED_SEPARATION_RATIO, 2.2]),
-        ] {
-            let at = |ratio: f64| [said(key, nominal_m * ratio), said(key, nominal_m / ratio)];
-            assert_eq!(at(0.99 * limits[0]), [(false, false); 2], "{key}");
-            assert_eq!(at(1.01 * limits[0]), [(true, false); 2], "{key}");
-            assert_eq!(at(1.01 * limits[1]), [(true, true); 2], "{key}");
+    fn numbers_that_are_none_are_refused_wherever_they_stand() {
+        let text = report().to_toml().expect("serialises");
+        let read = |text: &str| toml::from_str::<CalibrationReport>(text).map_err(|error| error.to_string());
+        assert!(read(&text.replace("value = 0.084", "value = 0.085")).is_ok());
+        for bad in ["nan", "-nan", "inf", "-inf", "1e308", "-1.0"] {
+            for field in ["sigma = 0.00001", "wheel_sigma_m_per_sqrt_m = 0.001", "turn_sigma_rad_per_sqrt_rad = 0.002"]
+            {
+                let key = field.split_once(' ').expect("a key").0;
+                assert!(text.contains(field), "{field} is not in {text}");
+                let why = read(&text.replace(field, &format!("{key} = {bad}"))).expect_err(key);
+                assert!(why.contains("is expected"), "{why}");
+            }
+        }
+        for bad in ["nan", "inf", "-inf", "1e308", "0.0", "-1.0"] {
+            let with_ratio = text.replace("value = 0.084", &format!("value = 0.084\nratio_to_nominal = {bad}"));
+            assert!(read(&with_ratio).expect_err("a ratio").contains("is expected"), "{bad}");
+        }
+        for bad in ["nan", "inf", "1e308"] {
+            let with_interval = text.replace("value = 0.084", &format!("value = 0.084\ninterval_95 = [0.0, {bad}]"));
+            assert!(read(&with_interval).expect_err("an interval").contains("is expected"), "{bad}");
         }
     }
 

@@ -10,7 +10,7 @@ use estimation::{LogDeadReckoning, LogPose, Model};
 use kinematics::{DriveGeometry, Pose, Rule};
 use model_term::ModelTerm;
 
-use crate::report::NamedCalibration;
+use crate::named_calibration::NamedCalibration;
 use crate::settings::{SAME_PLACE_M, TIME_TOLERANCE_S};
 
 /// A calibration, and mean terms with their values where it is an extended model.

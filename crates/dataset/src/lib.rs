@@ -5,6 +5,7 @@
 //! it (poses, displacements, marked points or wheel speeds). Estimators take borrowed views ([`Session`],
 //! [`RunView`]), so that a subset of the runs costs nothing.
 
+mod checked;
 mod column_names;
 mod corrections;
 mod counted;
@@ -26,6 +27,7 @@ mod packets;
 mod partial;
 mod pose_covariance;
 mod prefetch;
+mod quaternion;
 mod read;
 mod read_times;
 mod receipt_delays;
@@ -47,6 +49,7 @@ mod warning;
 mod wheel_angles;
 mod write;
 
+pub use checked::{Checked, NotNegative, Number, OutOfRange, Positive, Share, checked};
 pub use column_names::Quantity;
 pub use counter::{suspected_spike, suspected_wrap, wrap_warnings};
 pub use error::DatasetError;
@@ -59,6 +62,7 @@ pub use packets::rows_per_packet;
 pub use partial::{GyroNoise, GyroSample, HeadingReading, LidarExtrinsics, Revisit, TapeDistance, WallReading};
 pub use pose_covariance::PoseCovariance;
 pub use prefetch::read_ahead;
+pub use quaternion::Quaternion;
 pub use read::{Blocks, Loaded, RunByRun, read};
 pub use receipt_delays::has_bunched_rows;
 pub use record::{

@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
+use crate::checked::{Positive, checked};
 use crate::interval_means::interval_means;
 use crate::map_distortion::MapDistortion;
 use crate::partial::{GyroNoise, GyroSample, HeadingReading, LidarExtrinsics, Revisit, TapeDistance, WallReading};
@@ -66,14 +67,17 @@ pub struct Provenance {
 #[serde(deny_unknown_fields)]
 pub struct NominalRobot {
     /// Nominal diameter of the left wheel, metres.
+    #[serde(deserialize_with = "checked::<Positive, _>")]
     pub left_wheel_diameter_m: f64,
     /// Nominal diameter of the right wheel, metres.
+    #[serde(deserialize_with = "checked::<Positive, _>")]
     pub right_wheel_diameter_m: f64,
     /// Nominal distance between the wheel contacts, metres.
+    #[serde(deserialize_with = "checked::<Positive, _>")]
     pub wheel_separation_m: f64,
     /// Counts for one turn of a wheel, after decoding and gears; a real number. Absent when the robot reports
     /// no ticks.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "checked::<Option<Positive>, _>", skip_serializing_if = "Option::is_none")]
     pub ticks_per_rev: Option<f64>,
     /// Width of the tick counter, when it wraps and is to be unwrapped.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -84,3 +84,15 @@ pub(crate) const MAX_CHANCE_OF_COUNTS: f64 = 1e-12;
 /// Counts of a counter that are told from others by a number of double precision, and of any log.
 /// Derived: a number of 1e12 has steps of 1e-4, far below the tolerance.
 pub(crate) const MAX_COUNTS: f64 = 1e12;
+
+/// Largest number of a document that is read back: calibrations, kept results, states and baselines.
+/// Derived: its fourth power, of a Monte-Carlo error, times that of a count is a double.
+pub(crate) const LARGEST_NUMBER: f64 = 1e60;
+
+/// Smallest number above zero there.
+/// Derived: quotients with the largest one, and their squares, are doubles.
+pub(crate) const SMALLEST_POSITIVE: f64 = 1e-60;
+
+/// Lengths of quaternions that are rotations: rounded ones are 1 to within some 1e-3.
+/// Budgeted: messages that were never filled have 0, and a component that was overwritten is rarely near.
+pub(crate) const QUATERNION_LENGTH: std::ops::RangeInclusive<f64> = 0.5..=2.0;

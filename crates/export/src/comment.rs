@@ -85,7 +85,8 @@ pub(crate) fn variance(value: f64) -> String {
 
 /// "± 0.031 mm", or that nothing is known of it.
 pub(crate) fn plus_minus_mm(length: &Length) -> String {
-    length.sigma_m.map_or_else(|| "± not known".to_owned(), |sigma_m| format!("± {} mm", digits(1e3 * sigma_m)))
+    let sigma_mm = length.sigma_m.map(|sigma_m| 1e3 * sigma_m).filter(|sigma_mm| sigma_mm.is_finite());
+    sigma_mm.map_or_else(|| "± not known".to_owned(), |sigma_mm| format!("± {} mm", digits(sigma_mm)))
 }
 
 /// A standard deviation with two digits.
@@ -120,6 +121,15 @@ mod tests {
         );
         assert_eq!((digits(0.03123), digits(12.3), digits(0.0)), ("0.031".into(), "12".into(), "0.0".into()));
         assert_eq!((variance(1.234e-5), variance(1e6)), ("1.23e-5".into(), "1.00e+6".into()));
+    }
+
+    #[test]
+    fn a_standard_deviation_beyond_numbers_is_not_known() {
+        let of = |sigma_m| plus_minus_mm(&Length { value_m: 0.1, sigma_m, nominal_m: None });
+        assert_eq!(of(Some(2e-5)), "± 0.020 mm");
+        for none in [None, Some(f64::INFINITY), Some(f64::NAN), Some(1e306)] {
+            assert_eq!(of(none), "± not known");
+        }
     }
 
     #[test]

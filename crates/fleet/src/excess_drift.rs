@@ -13,7 +13,7 @@
 //! test is conservative.
 
 use calib::Calibration;
-use dataset::{NominalRobot, RunView, Session};
+use dataset::{NominalRobot, NotNegative, RunView, Session, Share, checked};
 use kinematics::{DriveGeometry, GeometryError, Point, Pose, Rule, Wheels};
 use nalgebra::{Cholesky, Matrix2x3, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -25,20 +25,29 @@ use crate::settings::DIFFERENCE_STEP;
 /// Predicted drift with the configured geometry minus that with the calibrated one, per cent of the distance.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ExcessDrift {
-    /// Per cent of the distance; never negative.
+    /// Per cent of the distance; never negative, and never above the drift that was measured.
+    #[serde(deserialize_with = "checked::<NotNegative, _>")]
     pub percent: f64,
     /// At most one standard deviation of it, per cent of the distance.
+    #[serde(deserialize_with = "checked::<NotNegative, _>")]
     pub sigma_percent: f64,
     /// Probability of calibrated values as far from the configured ones where these are right.
+    #[serde(deserialize_with = "checked::<Share, _>")]
     pub p_value: f64,
 }
 
 impl ExcessDrift {
-    /// The excess on the runs of a session.
+    /// The excess on the runs of a session, of which the configured geometry was measured to drift by
+    /// `drift_percent`: more than that a calibration cannot save.
     ///
     /// # Errors
     /// A sentence where the runs do not determine the geometry or go nowhere.
-    pub fn of(session: &Session<'_>, calibration: &Calibration, estimate: &GeometryEstimate) -> Result<Self, String> {
+    pub fn of(
+        session: &Session<'_>,
+        calibration: &Calibration,
+        estimate: &GeometryEstimate,
+        drift_percent: Option<f64>,
+    ) -> Result<Self, String> {
         if let Some(row) = (0..GEOMETRY.len()).find(|row| estimate.value_m[*row].is_none()) {
             return Err(format!("the runs do not determine {}", GEOMETRY[row].key()));
         }
@@ -61,7 +70,7 @@ impl ExcessDrift {
             return Err("no run goes anywhere: there is no distance to drift on".to_owned());
         }
         Ok(Self {
-            percent: 100.0 * separation_m / length_m,
+            percent: (100.0 * separation_m / length_m).min(drift_percent.unwrap_or(f64::INFINITY)),
             sigma_percent: 100.0 * error_m / length_m,
             p_value: p_value(&configured, &calibrated, covariance, calibration.runs_used).ok_or_else(no_scatter)?,
         })
@@ -153,7 +162,7 @@ mod tests {
         let calibrated = DriveGeometry::new(diameter_m, 0.3).expect("a drive");
         let covariance = Some(Covariance::from_diagonal_element(3, 3, sigma_m * sigma_m));
         let calibration = Calibration { covariance, runs_used: 5, ..Calibration::new("joint", calibrated, None) };
-        ExcessDrift::of(&set.session(), &calibration, &GeometryEstimate::of(&calibration, |_| true))
+        ExcessDrift::of(&set.session(), &calibration, &GeometryEstimate::of(&calibration, |_| true), None)
     }
 
     #[test]
@@ -192,7 +201,7 @@ mod tests {
         let mut set = straight();
         let calibration = Calibration::new("joint", set.robot.geometry().expect("a drive"), None);
         let of = |determined: fn(calib::Parameter) -> bool| {
-            ExcessDrift::of(&set.session(), &calibration, &GeometryEstimate::of(&calibration, determined))
+            ExcessDrift::of(&set.session(), &calibration, &GeometryEstimate::of(&calibration, determined), None)
         };
         assert!(of(|_| false).is_err_and(|why| why.contains("left_wheel_diameter_m")));
         assert!(of(|_| true).is_err_and(|why| why.contains("too few runs")));

@@ -1,6 +1,7 @@
 //! A robot's geometry as one session determines it.
 
 use calib::{Calibration, Covariance, Parameter};
+use dataset::{Number, Positive, checked};
 use kinematics::DriveGeometry;
 use serde::{Deserialize, Serialize};
 
@@ -18,9 +19,11 @@ pub(crate) fn geometry_m(geometry: &DriveGeometry) -> [f64; 3] {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GeometryEstimate {
     /// Left diameter, right diameter and separation, metres; `None` where the runs do not determine it.
+    #[serde(deserialize_with = "checked::<[Option<Positive>; 3], _>")]
     pub value_m: [Option<f64>; 3],
     /// Their covariance, m²; `None` where the runs show no scatter. Rows of what is not determined mean
     /// nothing.
+    #[serde(default, deserialize_with = "checked::<Option<[[Number; 3]; 3]>, _>")]
     pub covariance_m2: Option<[[f64; 3]; 3]>,
     /// What the runs do not determine.
     pub not_observable: Vec<Undetermined>,

@@ -1,6 +1,6 @@
 //! What one session shows of its robot, as it is kept.
 
-use dataset::{NominalRobot, Timestamp};
+use dataset::{NominalRobot, NotNegative, Number, Share, Timestamp, checked};
 use serde::{Deserialize, Serialize};
 
 use crate::excess_drift::ExcessDrift;
@@ -35,8 +35,10 @@ pub struct SessionResult {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SessionDrift {
     /// Under the configured parameters, per cent.
+    #[serde(default, deserialize_with = "checked::<Option<NotNegative>, _>")]
     pub nominal: Option<f64>,
     /// Under the session's own calibration, per cent: fitted to the same runs, and so too small for others.
+    #[serde(default, deserialize_with = "checked::<Option<NotNegative>, _>")]
     pub calibrated: Option<f64>,
     /// Why something is null.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -51,8 +53,10 @@ pub struct SessionFinding {
     /// All causes that these data do not discriminate.
     pub names: Vec<String>,
     /// Its probability.
+    #[serde(deserialize_with = "checked::<Share, _>")]
     pub probability: f64,
     /// Standard normal quantile of its p-value.
+    #[serde(deserialize_with = "checked::<Number, _>")]
     pub z: f64,
     /// In a sentence.
     pub sentence: String,

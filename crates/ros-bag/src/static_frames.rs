@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use dataset::Quaternion;
 use kinematics::Pose;
 
 use crate::topics;
@@ -47,16 +48,7 @@ impl Rigid {
         for (value, axis) in q.iter_mut().zip(["x", "y", "z", "w"]) {
             *value = number("rotation", axis)?;
         }
-        let norm = q.iter().map(|part| part * part).sum::<f64>().sqrt();
-        if !(norm.is_finite() && norm > 0.5) {
-            return None;
-        }
-        let [x, y, z, w] = q.map(|part| part / norm);
-        let rotation = [
-            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-        ];
+        let rotation = Quaternion::new(q)?.matrix();
         Some(Self { rotation, translation })
     }
 

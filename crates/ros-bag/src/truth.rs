@@ -1,6 +1,6 @@
 //! Poses of an outside instrument from messages.
 
-use dataset::{CovarianceScale, Dataset, PoseCovariance, TruthSigma};
+use dataset::{CovarianceScale, Dataset, PoseCovariance, Quaternion, TruthSigma};
 
 use crate::error::RosBagError;
 use crate::topics::{self, TRANSFORMS, Topic};
@@ -24,10 +24,6 @@ pub(crate) const TRUTH_TYPES: [(&str, &str, &str, Option<&str>); 4] = [
 
 /// Places of [`PoseCovariance::COLUMNS`] in a covariance of 6 × 6: those of x, y and the yaw.
 const COVARIANCE_PLACES: [usize; 6] = [0, 1, 5, 7, 11, 35];
-
-/// Shortest quaternion that has a direction; messages that were never filled have one of length 0, rounded
-/// ones of some 1 ± 1e-3.
-const MIN_QUATERNION_NORM: f64 = 0.5;
 
 /// How poses are read from a topic's messages.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -117,14 +113,14 @@ fn pose(message: &Value, position: &str, orientation: &str, covariance: Option<&
     };
     let [x, y, z, w] =
         [number(orientation, "x")?, number(orientation, "y")?, number(orientation, "z")?, number(orientation, "w")?];
-    let (theta_rad, tilt_rad) = heading_and_tilt(x, y, z, w).map_or((None, 0.0), |(theta, tilt)| (Some(theta), tilt));
+    let orientation = Quaternion::new([x, y, z, w]);
     let element = |place: usize| covariance.and_then(|at| message.list(at).get(place)?.number(""));
     let (precision, impossible) = precision(COVARIANCE_PLACES.map(|place| element(place).unwrap_or(0.0)));
     Ok(TruthReading {
         x_m: number(position, "x")?,
         y_m: number(position, "y")?,
-        theta_rad,
-        tilt_rad,
+        theta_rad: orientation.map(Quaternion::yaw_rad),
+        tilt_rad: orientation.map_or(0.0, Quaternion::tilt_rad),
         precision,
         impossible,
     })
@@ -182,37 +178,9 @@ pub(crate) fn doubt_of_covariances(readings: &[TruthReading]) -> Option<String> 
     Some(format!("{count} of {} covariances cannot be: {why}; of these the variances count alone", readings.len()))
 }
 
-/// Yaw, and the angle of the body's z axis to the room's; none of a quaternion without direction.
-fn heading_and_tilt(x: f64, y: f64, z: f64, w: f64) -> Option<(f64, f64)> {
-    let norm = (x * x + y * y + z * z + w * w).sqrt();
-    if !(norm.is_finite() && norm >= MIN_QUATERNION_NORM) {
-        return None;
-    }
-    let [x, y, z, w] = [x, y, z, w].map(|part| part / norm);
-    let yaw_rad = (2.0 * (w * z + x * y)).atan2(1.0 - 2.0 * (y * y + z * z));
-    let tilt_rad = (1.0 - 2.0 * (x * x + y * y)).clamp(-1.0, 1.0).acos();
-    Some((yaw_rad, tilt_rad))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_quaternion_is_a_heading_and_a_tilt() {
-        // Rounding of a handful of operations on numbers of size 1.
-        let close = |found: f64, expected: f64| (found - expected).abs() < 1e-12;
-        for yaw in [-3.0, -0.5, 0.0, 1.0, 3.1_f64] {
-            let (found, tilt) =
-                heading_and_tilt(0.0, 0.0, 2.0 * (yaw / 2.0).sin(), 2.0 * (yaw / 2.0).cos()).expect("a heading");
-            assert!(close(found, yaw) && tilt == 0.0, "{yaw} {found} {tilt}");
-        }
-        let half = 0.1_f64;
-        let (yaw, tilt) = heading_and_tilt(half.sin(), 0.0, 0.0, half.cos()).expect("a heading");
-        assert!(close(yaw, 0.0) && close(tilt, 0.2), "{yaw} {tilt}");
-        assert_eq!(heading_and_tilt(0.0, 0.0, 0.0, 0.0), None);
-        assert_eq!(heading_and_tilt(f64::NAN, 0.0, 0.0, 1.0), None);
-    }
 
     /// The pose of a message with a covariance whose elements at these places are not zero.
     fn read_with(elements: &[(usize, f64)]) -> TruthReading {

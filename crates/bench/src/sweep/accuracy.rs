@@ -11,6 +11,7 @@ use std::path::Path;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal};
 
+use super::plan::MAX_TRIALS;
 use super::result::{EstimatorResult, SweepResult};
 use crate::error::BenchError;
 
@@ -35,7 +36,7 @@ pub struct Comparison {
     pub was: f64,
     /// Now.
     pub is: f64,
-    /// The difference over its standard error.
+    /// The difference over its standard error; infinite where that is no number, so that it has moved.
     pub z: f64,
 }
 
@@ -48,7 +49,7 @@ pub struct AccuracyCheck {
     pub z_limit: f64,
     /// How many numbers were compared.
     pub compared: usize,
-    /// The largest |z| of all.
+    /// The largest |z| of all; infinite where one is no number.
     pub largest_z: f64,
     /// What has moved, the farthest first.
     pub moved: Vec<Comparison>,
@@ -65,7 +66,15 @@ pub fn read_baseline(path: &Path) -> Result<SweepResult, BenchError> {
     let failed = |why: String| BenchError::Baseline { path: path.display().to_string(), why };
     let bytes = atomic_file::read_at_most(path, MAX_RESULT_BYTES)
         .map_err(|error| failed(format!("{error}; --update writes a baseline")))?;
-    serde_json::from_slice(&bytes).map_err(|error| failed(format!("not a baseline: {error}")))
+    let baseline: SweepResult =
+        serde_json::from_slice(&bytes).map_err(|error| failed(format!("not a baseline: {error}")))?;
+    for point in &baseline.points {
+        let most = point.estimators.iter().map(|of| of.failures).max().unwrap_or(0);
+        if point.trials == 0 || point.trials > MAX_TRIALS || most > point.trials {
+            return Err(failed(format!("not a baseline: {most} failures in {} trials", point.trials)));
+        }
+    }
+    Ok(baseline)
 }
 
 /// Compares a sweep with a baseline; `location` (the baseline's file) is named in errors.
@@ -122,7 +131,7 @@ fn comparisons(
         statistic,
         was,
         is,
-        z,
+        z: if z.is_nan() { f64::INFINITY } else { z },
     };
     let over = |difference: f64, error: f64| if difference == 0.0 { 0.0 } else { difference / error };
     let mut found = Vec::new();
@@ -157,9 +166,12 @@ fn comparisons(
         }
     }
     // A number that is there on one side only has moved as far as can be.
-    if is.variance.is_some() != was.variance.is_some() || is.coverage.is_some() != was.coverage.is_some() {
-        let there = |of: &EstimatorResult| f64::from(u8::from(of.variance.is_some() && of.coverage.is_some()));
-        found.push(number("has a value", there(was), there(is), f64::INFINITY));
+    let there = |of: &EstimatorResult| {
+        [bias(of).is_some(), variance(of).is_some(), of.coverage.is_some(), of.coverage_68.is_some()]
+    };
+    if there(is) != there(was) {
+        let all = |of: &EstimatorResult| f64::from(u8::from(there(of) == [true; 4]));
+        found.push(number("has a value", all(was), all(is), f64::INFINITY));
     }
     found
 }

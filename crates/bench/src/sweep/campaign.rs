@@ -100,6 +100,7 @@ impl SweepPlan {
                 let (what, theirs, ours) = ("shard", found.shard.to_string(), state.shard.to_string());
                 return Err(BenchError::OtherSweep { path: path.display().to_string(), what, theirs, ours });
             }
+            found.check(self, path)?;
             state = found;
         }
         let mut spool = match campaign.folder.filter(|_| campaign.rows) {

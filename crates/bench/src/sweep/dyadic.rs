@@ -5,6 +5,8 @@
 //! interruptions and shards each hold some of the tree's nodes; put together they give the same root. A range
 //! of n summands needs at most 2 log₂ n nodes.
 
+use std::ops::Range;
+
 use serde::{Deserialize, Serialize};
 
 /// What can be summed.
@@ -62,6 +64,21 @@ impl<T: Merge> DyadicSum<T> {
         fits
     }
 
+    /// Whether the nodes are those of the leaves from the first to the next one, and `holds` of each with its
+    /// leaves.
+    pub(crate) fn is_whole(&self, holds: impl Fn(Range<u64>, &T) -> bool) -> bool {
+        let mut reached = self.first;
+        let is_next = |node: &Node<T>| {
+            let leaves = 1_u64.checked_shl(node.level).filter(|leaves| reached.is_multiple_of(*leaves));
+            let next = leaves.and_then(|leaves| reached.checked_add(leaves)).filter(|next| *next <= self.next);
+            let Some(next) = next else { return false };
+            let range = reached..next;
+            reached = next;
+            holds(range, &node.sum)
+        };
+        self.nodes.iter().all(is_next) && reached == self.next
+    }
+
     fn append(&mut self, mut node: Node<T>) {
         let mut start = self.next;
         self.next += 1 << node.level;
@@ -101,7 +118,7 @@ mod tests {
         }
     }
 
-    fn of(leaves: std::ops::Range<u64>, value: impl Fn(u64) -> f64) -> DyadicSum<Rounded> {
+    fn of(leaves: Range<u64>, value: impl Fn(u64) -> f64) -> DyadicSum<Rounded> {
         let mut sum = DyadicSum::starting_at(leaves.start);
         leaves.for_each(|leaf| sum.push(Rounded(value(leaf))));
         sum

@@ -47,7 +47,9 @@ pub fn merge(folders: &[PathBuf]) -> Result<Merged, BenchError> {
 
     let mut reached = ChunkIndex { point: 0, chunk: 0 };
     for (folder, state) in &shards {
-        state.same_campaign_as(&whole, &folder.join(STATE_FILE))?;
+        let path = folder.join(STATE_FILE);
+        state.same_campaign_as(&whole, &path)?;
+        state.check(&plan, &path)?;
         if !state.is_complete() {
             return Err(complain(folder, format!("shard {} is not finished; go on with --resume", state.shard)));
         }

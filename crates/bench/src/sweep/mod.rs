@@ -21,7 +21,7 @@ pub use accuracy::{AccuracyCheck, Comparison, FALSE_ALARM_BUDGET, compare, read_
 pub use campaign::{Campaign, Outcome, Progress};
 pub use lock::FolderLock;
 pub use merge::{Merged, merge};
-pub use plan::{SweepOptions, SweepPlan, TRACKED};
+pub use plan::{MAX_TRIALS, SweepOptions, SweepPlan, TRACKED};
 pub use result::{Coverage, DriftResult, EstimatorResult, MethodCost, PointResult, Quantile, SweepResult};
 pub use state::Shard;
 pub use table::{can_be_written, write_merged, write_results};

@@ -7,7 +7,9 @@ use motion_programs::MotionProgram;
 use scenario::{Point, Scenario};
 
 use super::result::{DriftResult, EstimatorResult, MethodCost, PointResult};
-use super::tally::{Bound, ChunkSum, Outcome, PointSum, Tally, estimator_result, largest_drift_error, largest_error};
+use super::tally::{
+    Bound, ChunkSum, LARGEST_ESTIMATE, Outcome, PointSum, Tally, estimator_result, largest_drift_error, largest_error,
+};
 use super::validation::Validation;
 use crate::bound::FisherInformation;
 use crate::error::BenchError;
@@ -20,6 +22,9 @@ pub const TRACKED: [Parameter; 3] = [Parameter::LeftPerTick, Parameter::RightPer
 /// Trials that are summed by one task, a leaf of the tree of sums. Fixed, so that the sums do not depend on
 /// who adds them; few, so that stepped trials of a second lose little when a campaign is killed.
 pub(super) const TRIALS_PER_CHUNK: u64 = 16;
+
+/// Most trials at a point: more than a year of any scenario, a typing error beyond.
+pub const MAX_TRIALS: u64 = 100_000_000;
 
 /// Most trials at a point that is to become precise, unless the caller says otherwise.
 const MAX_FOR_PRECISION: u64 = 1_000_000;
@@ -83,6 +88,9 @@ impl SweepPlan {
         };
         if trials < 2 {
             return Err(BenchError::TooFewTrials { trials });
+        }
+        if trials > MAX_TRIALS {
+            return Err(BenchError::TooManyTrials { trials, most: MAX_TRIALS });
         }
         scenario.seed = options.seed.unwrap_or(scenario.seed);
         let points = sweep.points(&scenario, &scenario.name)?;
@@ -326,7 +334,10 @@ impl PointSetup {
                 if let (Some(validation), Some(calibration)) = (&self.validation, calibration)
                     && calibration.converged
                 {
-                    sum.drift[number].push(validation.drift_percent(&calibration.geometry));
+                    let percent = validation.drift_percent(&calibration.geometry);
+                    if percent <= LARGEST_ESTIMATE {
+                        sum.drift[number].push(percent);
+                    }
                 }
             })?;
         }

@@ -19,6 +19,9 @@ const FINEST: f64 = 1e-7;
 /// Bins of one width; beyond, every doubling has as many.
 const LINEAR: f64 = 16_384.0;
 
+/// Largest relative error of a state that is read: its bin's edges are doubles, times any true value too.
+const LARGEST_ERROR: f64 = 1e60;
+
 /// Errors relative to the true value, counted.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct Histogram {
@@ -48,6 +51,14 @@ impl Histogram {
             let by = (q * (1.0 - q) / n).sqrt();
             (self.at(q * n), 0.5 * (self.at((q + by).min(1.0) * n) - self.at((q - by).max(0.0) * n)))
         })
+    }
+
+    /// Whether it holds so many errors, each in a bin that an error can have.
+    pub(crate) fn holds(&self, count: u64) -> bool {
+        let most = bin(LARGEST_ERROR);
+        let sum = self.bins.values().try_fold(0_u64, |sum, count| sum.checked_add(*count));
+        let are_bins = self.bins.iter().all(|(bin, count)| *count > 0 && (-1 - most..=most).contains(bin));
+        self.count == count && sum == Some(count) && are_bins
     }
 
     /// The value with `rank` errors below it.

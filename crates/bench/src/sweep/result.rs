@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use dataset::{NotNegative, Number, Positive, Share, checked};
 use scenario::Level;
 use serde::{Deserialize, Serialize};
 
@@ -15,7 +16,7 @@ pub struct SweepResult {
     /// Trials at each point; with a precision, at most.
     pub trials: u64,
     /// Largest Monte-Carlo error that was asked for.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "checked::<Option<Share>, _>", skip_serializing_if = "Option::is_none")]
     pub precision: Option<f64>,
     /// Point by point, in the order of the design.
     pub points: Vec<PointResult>,
@@ -48,8 +49,10 @@ pub struct MethodCost {
     /// Runs driven.
     pub runs: u64,
     /// Driving and handling.
+    #[serde(deserialize_with = "checked::<NotNegative, _>")]
     pub minutes: f64,
     /// Mean travel of the wheels.
+    #[serde(deserialize_with = "checked::<NotNegative, _>")]
     pub metres: f64,
 }
 
@@ -57,12 +60,16 @@ pub struct MethodCost {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Coverage {
     /// The share.
+    #[serde(deserialize_with = "checked::<Share, _>")]
     pub share: f64,
     /// Its Monte-Carlo standard error.
+    #[serde(deserialize_with = "checked::<NotNegative, _>")]
     pub mcse: f64,
     /// Lower 95 % bound (Clopper & Pearson 1934).
+    #[serde(default, deserialize_with = "checked::<Option<Share>, _>")]
     pub low: Option<f64>,
     /// Upper 95 % bound.
+    #[serde(default, deserialize_with = "checked::<Option<Share>, _>")]
     pub high: Option<f64>,
 }
 
@@ -70,10 +77,13 @@ pub struct Coverage {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Quantile {
     /// The share.
+    #[serde(deserialize_with = "checked::<Share, _>")]
     pub share: f64,
     /// The error, in the parameter's unit.
+    #[serde(deserialize_with = "checked::<Number, _>")]
     pub error: f64,
     /// Its Monte-Carlo standard error (Woodruff 1952).
+    #[serde(deserialize_with = "checked::<NotNegative, _>")]
     pub mcse: f64,
 }
 
@@ -85,22 +95,30 @@ pub struct EstimatorResult {
     /// The parameter's key.
     pub parameter: String,
     /// Its true value, SI.
+    #[serde(deserialize_with = "checked::<Positive, _>")]
     pub truth: f64,
     /// Mean error.
+    #[serde(default, deserialize_with = "checked::<Option<Number>, _>")]
     pub bias: Option<f64>,
     /// Monte-Carlo standard error of the bias.
+    #[serde(default, deserialize_with = "checked::<Option<NotNegative>, _>")]
     pub bias_mcse: Option<f64>,
     /// Variance of the error.
+    #[serde(default, deserialize_with = "checked::<Option<NotNegative>, _>")]
     pub variance: Option<f64>,
     /// Monte-Carlo standard error of the variance.
+    #[serde(default, deserialize_with = "checked::<Option<NotNegative>, _>")]
     pub variance_mcse: Option<f64>,
     /// Root of the mean squared error.
+    #[serde(default, deserialize_with = "checked::<Option<NotNegative>, _>")]
     pub rmse: Option<f64>,
     /// Monte-Carlo standard error of the RMSE.
+    #[serde(default, deserialize_with = "checked::<Option<NotNegative>, _>")]
     pub rmse_mcse: Option<f64>,
     /// The errors that 5 %, half and 95 % of the trials stay below.
     pub quantiles: Vec<Quantile>,
     /// Share of the 95 % intervals (±1.96 sigma) that hold the truth.
+    #[serde(default, deserialize_with = "checked::<Option<Share>, _>")]
     pub coverage: Option<f64>,
     /// The same with its errors.
     pub coverage_95: Option<Coverage>,
@@ -115,10 +133,13 @@ pub struct EstimatorResult {
     pub common_scale_observable: bool,
     /// Square root of the Cramér–Rao bound: no unbiased method's standard deviation is smaller on this
     /// protocol. Where the common scale is not observable it is the bound for a known mean diameter.
+    #[serde(default, deserialize_with = "checked::<Option<NotNegative>, _>")]
     pub cramer_rao_sigma: Option<f64>,
     /// RMSE² over the Cramér–Rao bound.
+    #[serde(default, deserialize_with = "checked::<Option<NotNegative>, _>")]
     pub cramer_rao_ratio: Option<f64>,
     /// Monte-Carlo standard error of that ratio.
+    #[serde(default, deserialize_with = "checked::<Option<NotNegative>, _>")]
     pub cramer_rao_ratio_mcse: Option<f64>,
     /// Why there is no ratio.
     pub cramer_rao_why_null: Option<String>,
@@ -141,11 +162,15 @@ pub struct DriftResult {
     /// The method.
     pub method: String,
     /// Mean over trials, per cent of the path's length.
+    #[serde(default, deserialize_with = "checked::<Option<NotNegative>, _>")]
     pub mean_percent: Option<f64>,
     /// Its Monte-Carlo standard error.
+    #[serde(default, deserialize_with = "checked::<Option<NotNegative>, _>")]
     pub mean_percent_mcse: Option<f64>,
     /// Root of the mean square.
+    #[serde(default, deserialize_with = "checked::<Option<NotNegative>, _>")]
     pub rms_percent: Option<f64>,
     /// Its Monte-Carlo standard error.
+    #[serde(default, deserialize_with = "checked::<Option<NotNegative>, _>")]
     pub rms_percent_mcse: Option<f64>,
 }

@@ -8,10 +8,11 @@
 use std::ops::Range;
 use std::path::Path;
 
+use dataset::{Share, checked};
 use serde::{Deserialize, Serialize};
 
 use super::plan::SweepPlan;
-use super::result::PointResult;
+use super::result::{EstimatorResult, PointResult};
 use super::tally::PointSum;
 use crate::error::BenchError;
 
@@ -44,8 +45,8 @@ impl Shard {
     /// The shard's share of `units` that are counted from 0; the shares of all shards follow each other.
     #[must_use]
     pub const fn share(self, units: u64) -> Range<u64> {
-        let (number, of) = (self.number as u64, self.of as u64);
-        units * (number - 1) / of..units * number / of
+        let (number, of, units) = (self.number as u128, self.of as u128, units as u128);
+        (units * (number - 1) / of) as u64..(units * number / of) as u64
     }
 
     /// Its number, from 1, and how many there are.
@@ -87,6 +88,7 @@ struct Identity {
     program: String,
     seed: u64,
     trials: u64,
+    #[serde(default, deserialize_with = "checked::<Option<Share>, _>")]
     precision: Option<f64>,
     methods: Vec<String>,
     rows: bool,
@@ -175,11 +177,49 @@ impl State {
     pub(super) fn read(path: &Path) -> Result<Self, BenchError> {
         let not_a_state = |why: String| BenchError::NotAState { path: path.display().to_string(), why };
         let bytes = atomic_file::read_at_most(path, MAX_STATE_BYTES).map_err(|error| not_a_state(error.to_string()))?;
-        let state: Self = serde_json::from_slice(&bytes).map_err(|error| not_a_state(error.to_string()))?;
-        if state.first > state.next || state.next > state.end {
-            return Err(not_a_state("its places are out of order".to_owned()));
+        serde_json::from_slice(&bytes).map_err(|error| not_a_state(error.to_string()))
+    }
+
+    /// Refuses a state that this plan cannot have come to; it is of its campaign.
+    pub(super) fn check(&self, plan: &SweepPlan, path: &Path) -> Result<(), BenchError> {
+        self.why_not_of(plan)
+            .map_or(Ok(()), |why| Err(BenchError::NotAState { path: path.display().to_string(), why: why.to_owned() }))
+    }
+
+    fn why_not_of(&self, plan: &SweepPlan) -> Option<&'static str> {
+        let shard = Shard::new(self.shard.number, self.shard.of);
+        let Some(begun) = shard.and_then(|shard| Self::new(plan, shard, self.rows()).ok()) else {
+            return Some("its shard is none");
+        };
+        let Self { first, next, end, .. } = *self;
+        if (first, end) != (begun.first, begun.end) || first > next || next > end || next.chunk > plan.chunks() {
+            return Some("its places are not those of its shard");
         }
-        Ok(state)
+        // Every point up to the place is done, or stands there in part.
+        let is_begun = next.chunk > if next.point == first.point { first.chunk } else { 0 };
+        let finished = self.finished.iter().map(|(point, _)| *point);
+        let mut points: Vec<usize> = finished.chain(self.open.iter().map(|(point, _)| *point)).collect();
+        points.sort_unstable();
+        if !points.into_iter().eq(first.point..next.point + usize::from(is_begun)) {
+            return Some("its points are not those before its place");
+        }
+        let is_result = |result: &PointResult| {
+            let is_of = |of: &EstimatorResult| of.failures <= result.trials;
+            result.trials <= plan.trials
+                && result.estimators.len() == plan.estimates()
+                && result.estimators.iter().all(is_of)
+        };
+        let is_part = |(point, sum): &(usize, PointSum)| {
+            let from = if *point == first.point { first.chunk } else { 0 };
+            let to = if *point == next.point { next.chunk } else { plan.chunks() };
+            let sizes = (plan.estimates(), plan.methods.len());
+            (sum.chunks.first(), sum.chunks.next()) == (from, to)
+                && sum.is_of(sizes, plan.chunks(), |chunk| plan.trials_before(chunk))
+        };
+        if !self.finished.iter().all(|(_, result)| is_result(result)) || !self.open.iter().all(is_part) {
+            return Some("its sums are of no such trials");
+        }
+        None
     }
 
     /// Writes the state in one piece: aside under one name, which the next writing takes again when a kill

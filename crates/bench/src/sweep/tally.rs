@@ -1,6 +1,8 @@
 //! What a sweep keeps of its trials: for each method and parameter the moments of the error, its quantiles
 //! and how often the intervals held the truth.
 
+use std::ops::Range;
+
 use calib::{Calibration, Parameter};
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{Beta, ContinuousCDF};
@@ -19,6 +21,10 @@ const BOUND_TAIL: f64 = 0.025;
 /// Shares at which quantiles are stated.
 pub(super) const QUANTILES: [f64; 3] = [0.05, 0.5, 0.95];
 
+/// Largest value that counts as an estimate, SI; beyond, the method failed. Fourth powers of its errors, and
+/// their sums, can be kept and read back.
+pub(super) const LARGEST_ESTIMATE: f64 = 1e12;
+
 /// What one trial says of one method's estimate of one parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Outcome {
@@ -35,9 +41,8 @@ impl Outcome {
     pub(super) fn of(calibration: Option<&Calibration>, parameter: Parameter) -> Self {
         let none = Self { value: f64::NAN, sigma: f64::NAN, blind: false };
         let Some(calibration) = calibration.filter(|calibration| calibration.converged) else { return none };
-        let Some(estimate) = calibration.estimate(parameter).filter(|estimate| estimate.value.is_finite()) else {
-            return none;
-        };
+        let is_value = |estimate: &calib::Estimate| estimate.value.abs() <= LARGEST_ESTIMATE;
+        let Some(estimate) = calibration.estimate(parameter).filter(is_value) else { return none };
         let blind =
             |blind: &calib::NotObservable| blind.parameter == parameter || blind.parameter == Parameter::CommonScale;
         Self {
@@ -78,6 +83,14 @@ impl Tally {
     /// Did the method say in any trial that it cannot see the parameter?
     pub(super) const fn is_blind(&self) -> bool {
         self.blind > 0
+    }
+
+    /// Whether it can be of so many trials.
+    fn is_of(&self, trials: u64) -> bool {
+        let count = self.errors.count();
+        let within = [self.blind, self.with_sigma].into_iter().all(|part| part as f64 <= count);
+        let is_covered = self.covered.into_iter().all(|covered| covered <= self.with_sigma);
+        count + self.failures as f64 == trials as f64 && within && is_covered
     }
 
     fn coverage(&self, which: usize) -> Option<Coverage> {
@@ -134,6 +147,30 @@ impl PointSum {
             histograms: vec![Histogram::default(); estimates],
             decision_chunk,
         }
+    }
+
+    /// Whether it can be of a point with these estimates and methods, `chunks` of them at the most, of which
+    /// `trials_before` tells the trials.
+    pub(super) fn is_of(
+        &self,
+        (estimates, methods): (usize, usize),
+        chunks: u64,
+        trials_before: impl Fn(u64) -> u64,
+    ) -> bool {
+        let is_chunk = |leaves: Range<u64>, sum: &ChunkSum| {
+            let trials = trials_before(leaves.end) - trials_before(leaves.start);
+            let is_drift = |drift: &Moments| drift.count().fract() == 0.0 && drift.count() <= trials as f64;
+            sum.estimates.len() == estimates
+                && sum.drift.len() == methods
+                && sum.estimates.iter().all(|tally| tally.is_of(trials))
+                && sum.drift.iter().all(is_drift)
+        };
+        let are_chunks = self.chunks.next() <= chunks && (1..=chunks).contains(&self.decision_chunk);
+        if !are_chunks || !self.chunks.is_whole(is_chunk) || self.histograms.len() != estimates {
+            return false;
+        }
+        let total = self.chunks.total().unwrap_or_default();
+        total.estimates.iter().zip(&self.histograms).all(|(tally, of)| of.holds(tally.errors.count() as u64))
     }
 
     /// Adds the trials that follow; false when they do not.

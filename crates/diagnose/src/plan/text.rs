@@ -21,7 +21,8 @@ fn kind(schedule: &Schedule) -> String {
         }
         Schedule::SpinsAtSpeeds { turn_rad, slowest_m_s, fastest_m_s, .. } => {
             let turns = turn_rad / TAU;
-            format!("spins of {turns:.0} turns on the spot at {slowest_m_s} to {fastest_m_s} m/s, both ways")
+            let [slowest, fastest] = [slowest_m_s, fastest_m_s].map(speed);
+            format!("spins of {turns:.0} turns on the spot at {slowest} to {fastest} m/s, both ways")
         }
         Schedule::Squares { side_m, .. } => {
             format!("squares with sides of {side_m:.2} m, clockwise and counter-clockwise in turn")
@@ -34,7 +35,14 @@ fn kind(schedule: &Schedule) -> String {
 }
 
 pub(super) fn manoeuvre(manoeuvre: &Manoeuvre) -> String {
-    format!("{} at {} m/s", kind(&manoeuvre.schedule), manoeuvre.speed_m_s)
+    format!("{} at {} m/s", kind(&manoeuvre.schedule), speed(manoeuvre.speed_m_s))
+}
+
+/// A speed that a person sets, m/s: to the millimetre a second, and below 1 cm/s to two digits.
+fn speed(m_s: f64) -> String {
+    let decimals = if m_s >= 0.01 { 3 } else { (1.0 - m_s.log10().floor()).clamp(3.0, 9.0) as usize };
+    let text = format!("{m_s:.decimals$}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
 fn driven(part: &Part) -> String {
@@ -210,6 +218,8 @@ mod tests {
             speeds: 2,
             runs_each_way: 1,
         };
+        let digits = [0.0621, 0.25, 1.0, 0.125, 0.00418, 0.1].map(speed);
+        assert_eq!(digits, ["0.062", "0.25", "1", "0.125", "0.0042", "0.1"]);
         assert_eq!(kind(&at_speeds), "spins of 2 turns on the spot at 0.1 to 0.3 m/s, both ways");
     }
 

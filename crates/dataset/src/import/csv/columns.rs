@@ -8,6 +8,7 @@ use super::took::{Basis, Confidence};
 use crate::column_names::{NameReading, Quantity, read_name};
 use crate::error::{DatasetError, shown};
 use crate::name_units::unreadable_unit;
+use crate::quaternion::Quaternion;
 use crate::read::why_no_id;
 use crate::unit::Unit;
 
@@ -327,8 +328,8 @@ impl Log {
                 let theta = match (heading, quaternion) {
                     (Some(heading), _) => number(heading)?,
                     (None, [Some(x), Some(y), Some(z), Some(w)]) => {
-                        let (x, y, z, w) = (number(x)?, number(y)?, number(z)?, number(w)?);
-                        (2.0 * (w * z + x * y)).atan2(w * w + x * x - y * y - z * z)
+                        let parts = [number(x)?, number(y)?, number(z)?, number(w)?];
+                        Quaternion::new(parts).map_or(f64::NAN, Quaternion::yaw_rad)
                     }
                     _ => f64::NAN,
                 };

@@ -20,6 +20,7 @@ use super::took::{Basis, Confidence};
 use super::{FromCsv, dataset, parts};
 use crate::column_names::Quantity;
 use crate::error::{DatasetError, shown};
+use crate::quaternion::Quaternion;
 use crate::unit::Unit;
 
 /// Columns of the format.
@@ -142,13 +143,14 @@ fn read_poses(file: &Path, remarks: &mut Vec<String>) -> Result<Part, DatasetErr
         for (part, text) in quaternion.iter_mut().zip(&fields[4..]) {
             *part = sheet.decimal.number(text).unwrap_or(f64::NAN);
         }
-        let [x, y, ..] = quaternion;
-        let length = quaternion.iter().map(|part| part * part).sum::<f64>().sqrt();
-        if length.is_finite() && !UNIT_LENGTH.contains(&length) {
-            let message = format!("qx qy qz qw have length {length:.3}; a unit quaternion has 1");
+        let length = Quaternion::length(quaternion);
+        // Of a pose without an orientation instruments write NaN.
+        if !length.is_nan() && !UNIT_LENGTH.contains(&length) {
+            let found = if length < 1e3 { format!("{length:.3}") } else { "above 1000".to_owned() };
+            let message = format!("qx qy qz qw have length {found}; a unit quaternion has 1");
             return Err(DatasetError::Foreign { file: file.to_owned(), line, message });
         }
-        let tilt_rad = (1.0 - 2.0 * (x * x + y * y) / (length * length)).clamp(-1.0, 1.0).acos();
+        let tilt_rad = Quaternion::new(quaternion).map_or(0.0, Quaternion::tilt_rad);
         if tilt_rad > most_tilted.0 {
             most_tilted = (tilt_rad, line);
         }
@@ -312,6 +314,10 @@ mod tests {
         assert!(message.contains("truth.tum:2: the pose is tilted by 180°"), "{message}");
         let message = refused(&with("1700000006 1 2 0 0 0 0 0"));
         assert!(message.contains("truth.tum:2: qx qy qz qw have length 0.000"), "{message}");
+        for bad in ["inf", "1e200", "-1e308"] {
+            let message = refused(&with(&format!("1700000006 1 2 0 0 0 {bad} 1")));
+            assert!(message.contains("truth.tum:2: qx qy qz qw have length above 1000"), "{message}");
+        }
         let message = refused("1,2,0\n3,4,5\n");
         assert!(message.contains("truth.tum:1: \"1,2,0\"; expected a TUM trajectory: 8 numbers"), "{message}");
         let message = refused("1 0 0 1 0 1 0 2 0 0 1 0\n1 0 0 1 0 1 0 2 0 0 1 0\n");
