@@ -109,6 +109,7 @@ impl Columns {
         let odometry = Odometry { t_s: t_s.as_array().to_vec().into(), wheels, ..Odometry::default() };
         let info = RunInfo { id, ..RunInfo::default() };
         self.dataset.runs.push(Run { info, odometry, ..Run::default() });
+        self.dataset.carry_wheel_angles();
         Ok(())
     }
 

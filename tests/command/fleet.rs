@@ -271,19 +271,3 @@ fn a_kept_session_with_numbers_of_no_robot_is_found_anew() {
     }
     assert!(succeed(at, &arguments).stderr.contains("0 datasets computed, 1 reused"));
 }
-
-/// Odometry that misses the truth by a little cannot be saved more than that.
-#[test]
-fn an_excess_is_not_above_the_drift() {
-    let temp = tempfile::tempdir().expect("a temporary folder");
-    let at = temp.path();
-    fleet(at);
-    let found = document(at, &["fleet", "robots", "--calibrate-only"]);
-    for robot in entries(&found, "robots") {
-        let latest = entries(robot, "sessions").last().expect("a session");
-        let drift = latest["drift_percent"]["nominal"].as_f64().expect("a drift");
-        if let Some(excess) = robot["excess_drift_percent"]["value"].as_f64() {
-            assert!(excess <= drift, "{excess} {drift}");
-        }
-    }
-}

@@ -159,10 +159,26 @@ mod tests {
     }
 
     fn excess(set: &Dataset, diameter_m: Wheels<f64>, sigma_m: f64) -> Result<ExcessDrift, String> {
+        excess_of_drift(set, diameter_m, sigma_m, None)
+    }
+
+    fn excess_of_drift(
+        set: &Dataset,
+        diameter_m: Wheels<f64>,
+        sigma_m: f64,
+        drift_percent: Option<f64>,
+    ) -> Result<ExcessDrift, String> {
         let calibrated = DriveGeometry::new(diameter_m, 0.3).expect("a drive");
         let covariance = Some(Covariance::from_diagonal_element(3, 3, sigma_m * sigma_m));
         let calibration = Calibration { covariance, runs_used: 5, ..Calibration::new("joint", calibrated, None) };
-        ExcessDrift::of(&set.session(), &calibration, &GeometryEstimate::of(&calibration, |_| true), None)
+        ExcessDrift::of(&set.session(), &calibration, &GeometryEstimate::of(&calibration, |_| true), drift_percent)
+    }
+
+    #[test]
+    fn regress_an_excess_is_not_above_the_drift() {
+        let of = |drift| excess_of_drift(&straight(), Wheels::both(0.101), 1e-4, drift).expect("determined").percent;
+        assert_eq!(of(Some(0.2)), 0.2);
+        assert!(of(Some(5.0)) < 1.0);
     }
 
     #[test]
