@@ -99,7 +99,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let hidden = hide(arguments.fault.as_deref(), seed, &robot, terminal)?;
     robot.effects.push(hidden.effect.clone());
     let _new = NewFolders::to(out);
-    std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
+    atomic_file::create_folder(out).map_err(|error| format!("{}: {error}", out.display()))?;
     let path = |name: &str| out.join(name);
 
     let simulated = sim_yair::simulate(&robot, seed, FITTED)?;

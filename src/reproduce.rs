@@ -41,7 +41,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let page = reproduction.page();
     if let Some(out) = &arguments.out {
         let _new = NewFolders::to(out);
-        std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
+        atomic_file::create_folder(out).map_err(|error| format!("{}: {error}", out.display()))?;
         write_whole(&out.join("paper.md"), page.as_bytes())?;
         for (stem, _, figure) in reproduction.pictures() {
             figure.write(out, stem)?;

@@ -4,6 +4,8 @@
 mod accuracy_gate;
 mod bad_input;
 mod bad_logs;
+#[cfg(unix)]
+mod bounds;
 mod cluster;
 mod compare;
 mod contract;
@@ -26,6 +28,8 @@ mod interrupt;
 #[cfg(unix)]
 mod kills;
 mod limits;
+#[cfg(unix)]
+mod links;
 mod pages;
 mod partial;
 mod pose_errors;
