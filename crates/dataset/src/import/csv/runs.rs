@@ -142,7 +142,7 @@ impl<'p> PoseRows<'p> {
         self.by_run[self.numbers.get(id).copied().unwrap_or(0)].clone()
     }
 
-    /// Of another file's run: by its name, or those between two `times` where this file has no column of runs.
+    /// Of another file's run: by its name, or between two `times` where this file has no column of runs.
     fn of_run(&self, id: &str, times: Option<(i128, i128)>) -> Vec<usize> {
         let time = &self.part.log.time;
         match (self.part.log.run.is_empty(), times) {
