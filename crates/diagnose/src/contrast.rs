@@ -1,5 +1,5 @@
-//! The contrast of one unit with all others: is its size more than half of theirs? With a of the unit and b of
-//! the others, it is a − ½ b in the sense of b.
+//! The contrast of one unit with all others: is its size more than half of theirs? With a of the unit and b
+//! of the others, it is a − ½ b in the sense of b.
 
 use nalgebra::DMatrix;
 
