@@ -72,7 +72,7 @@ pictures:
 fuzz:
     .ci/run fuzz
 
-# kill -9 at two hundred random instants of imports, diagnoses and sweeps; docs/reliability.md has its table
+# kill -9 and SIGTERM at two hundred and sixty random instants of nine commands; docs/reliability.md has its table
 kills:
     .ci/run kills
 

@@ -12,8 +12,10 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 use std::sync::Arc;
 
+use anstream::{AutoStream, ColorChoice};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
+use crate::signals::Signals;
 use crate::terminal::{Printed, Terminal};
 use crate::{
     calibrate, challenge, check, command_line, compare, correct, demo, diagnose_command, evaluate, export_command,
@@ -64,7 +66,8 @@ const USAGE: u8 = 2;
 /// What a [`call`] gave: what the process would have printed, apart.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Call {
-    /// 0 success, 1 bad input or failure, 2 bad usage, 3 beyond a limit that was set, 130 interrupted.
+    /// 0 success, 1 bad input or failure, 2 bad usage, 3 beyond a limit that was set, 130 interrupted,
+    /// 143 terminated.
     pub exit_code: u8,
     /// The JSON document, byte by byte as `--json` prints it.
     pub document: Option<String>,
@@ -74,20 +77,30 @@ pub struct Call {
     pub failure: Option<String>,
 }
 
-/// Runs the command as a process does, which prints and answers Ctrl-C, and returns its exit code. The first
+/// Runs the command as a process does, which prints and answers signals, and returns its exit code. The first
 /// argument is the program's name.
 pub fn main(arguments: impl IntoIterator<Item = impl Into<OsString>>) -> u8 {
     let arguments: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
-    let cli = match parsed(&arguments) {
-        Ok(cli) => cli,
-        Err(error) => {
-            // As `clap` itself does: a reader that has gone away is no failure.
+    let signals = Signals::answered();
+    let (terminal, code) = match parsed(&arguments) {
+        Ok(cli) => {
+            let terminal = Terminal::new(cli.json, cli.quiet, signals);
+            let code = run(&cli, &arguments, &terminal);
+            (terminal, code)
+        }
+        Err(error) if error.use_stderr() => {
             let _ = error.print();
-            return if error.use_stderr() { USAGE } else { 0 };
+            return USAGE;
+        }
+        Err(help) => {
+            let terminal = Terminal::new(false, false, signals);
+            let text = help.render();
+            let has_colours = AutoStream::choice(&std::io::stdout()) != ColorChoice::Never;
+            terminal.print(if has_colours { text.ansi().to_string() } else { text.to_string() }.as_bytes());
+            (terminal, 0)
         }
     };
-    let terminal = Terminal::new(cli.json, cli.quiet);
-    run(&cli, &arguments, &terminal)
+    terminal.exit_code(code)
 }
 
 /// Runs the command inside of another program, with `--json`: nothing is printed, and no signal is handled.
@@ -141,7 +154,7 @@ fn run(cli: &Cli, arguments: &[OsString], terminal: &Terminal) -> u8 {
         Command::Merge(arguments) => merge::run(arguments, terminal),
         Command::Plan(arguments) => plan::run(arguments, terminal),
         Command::Reproduce(arguments) => reproduce::run(arguments, terminal),
-        Command::Completions(arguments) => manual::completions(arguments, grammar()),
+        Command::Completions(arguments) => manual::completions(arguments, grammar(), terminal),
         Command::Man(arguments) => manual::man(arguments, grammar(), terminal),
     };
     match outcome {

@@ -13,7 +13,12 @@ pub(crate) fn keep(arguments: &[OsString]) {
     TYPED.with(|typed| *typed.borrow_mut() = arguments.to_vec());
 }
 
-/// The arguments without the program's name.
+/// What becomes of files that are there already changes no result, and is not told.
+const OF_REPLACEMENT: [&str; 2] = ["--force", "--replace"];
+
+/// The arguments that results depend on, without the program's name.
 pub(crate) fn typed() -> Vec<String> {
-    TYPED.with(|typed| typed.borrow().iter().skip(1).map(|argument| argument.to_string_lossy().into_owned()).collect())
+    let text = |argument: &OsString| argument.to_string_lossy().into_owned();
+    let typed: Vec<String> = TYPED.with(|typed| typed.borrow().iter().skip(1).map(text).collect());
+    typed.into_iter().filter(|argument| !OF_REPLACEMENT.contains(&argument.as_str())).collect()
 }

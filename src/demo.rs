@@ -97,7 +97,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     robot.effects.retain(|effect| effects::description(effect.id()).is_some_and(|of| of.geometry.is_some()));
     let hidden = hide(arguments.fault.as_deref(), seed, &robot, terminal)?;
     robot.effects.push(hidden.effect.clone());
-    std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
+    atomic_file::create_folder(out).map_err(|error| format!("{}: {error}", out.display()))?;
     let path = |name: &str| out.join(name);
 
     let simulated = sim_yair::simulate(&robot, seed, FITTED)?;

@@ -1,6 +1,5 @@
 //! `yair completions SHELL` and `yair man`: the command as shells and `man` know it.
 
-use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -25,21 +24,24 @@ pub(crate) struct Man {
     out: Option<PathBuf>,
 }
 
-pub(crate) fn completions(arguments: &Completions, mut command: Command) -> Result<ExitCode, Failure> {
+pub(crate) fn completions(
+    arguments: &Completions,
+    mut command: Command,
+    terminal: &Terminal,
+) -> Result<ExitCode, Failure> {
     let mut text = Vec::new();
     clap_complete::generate(arguments.shell, &mut command, "yair", &mut text);
-    std::io::stdout().write_all(&text).map_err(|error| format!("standard output: {error}"))?;
+    terminal.print(&text);
     Ok(ExitCode::SUCCESS)
 }
 
 pub(crate) fn man(arguments: &Man, mut command: Command, terminal: &Terminal) -> Result<ExitCode, Failure> {
     command.build();
     let Some(out) = &arguments.out else {
-        let page = rendered(command)?;
-        std::io::stdout().write_all(&page).map_err(|error| format!("standard output: {error}"))?;
+        terminal.print(&rendered(command)?);
         return Ok(ExitCode::SUCCESS);
     };
-    std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
+    atomic_file::create_folder(out).map_err(|error| format!("{}: {error}", out.display()))?;
     let mut written = 0;
     let mut waiting = vec![("yair".to_owned(), command)];
     while let Some((name, command)) = waiting.pop() {

@@ -222,7 +222,7 @@ fn write_scenarios(
     next: &NextExperiment,
     terminal: &Terminal,
 ) -> Result<Vec<String>, Failure> {
-    std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
+    atomic_file::create_folder(out).map_err(|error| format!("{}: {error}", out.display()))?;
     let mut written = Vec::new();
     for (number, session) in next.sessions.iter().enumerate() {
         let mut scenario =

@@ -39,7 +39,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let elapsed_s = started.elapsed().as_secs_f64();
     let page = reproduction.page();
     if let Some(out) = &arguments.out {
-        std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
+        atomic_file::create_folder(out).map_err(|error| format!("{}: {error}", out.display()))?;
         write_whole(&out.join("paper.md"), page.as_bytes())?;
         for (stem, _, figure) in reproduction.pictures() {
             figure.write(out, stem)?;

@@ -4,14 +4,13 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use atomic_file::{WorkFolder, remove_leftovers};
+use atomic_file::{StagedFile, WorkFolder, remove_leftovers};
 use clap::Args;
 use dataset::{Dataset, DatasetError, Existing, Writer};
 use effects::Address;
 use scenario::Scenario;
 use serde::Serialize;
 use sim_yair::Simulation;
-use tempfile::NamedTempFile;
 
 use crate::session_identity::SessionIdentity;
 use crate::terminal::{Failure, Terminal};
@@ -73,7 +72,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     create_parents(&truth)?;
     let waiting = staged(&truth, &serde_json::to_vec_pretty(&simulation.truth)?)?;
     write_dataset(&simulation.dataset, &arguments.out, arguments.force)?;
-    waiting.persist(&truth).map_err(|error| format!("{}: {}", truth.display(), error.error))?;
+    waiting.persist(&truth).map_err(|error| format!("{}: {error}", truth.display()))?;
 
     let runs = &simulation.dataset.runs;
     let document = Document {
@@ -172,8 +171,14 @@ fn create_parents(path: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()).into())
 }
 
+/// Refuses a link in the place of a folder of results.
+pub(crate) fn refuse_link(out: &Path) -> Result<(), Failure> {
+    atomic_file::refuse_link(out).map_err(|error| format!("{}: {error}", out.display()).into())
+}
+
 /// Refuses a folder that has something in it, unless `force` says to write into it.
 pub(crate) fn refuse_filled(out: &Path, force: bool) -> Result<(), Failure> {
+    refuse_link(out)?;
     remove_leftovers(out);
     let taken = out.read_dir().map_or_else(|_| out.exists(), |mut entries| entries.next().is_some());
     if taken && (!force || !out.is_dir()) {
@@ -192,7 +197,8 @@ pub(crate) fn write_folder<T>(
     write: impl FnOnce(&Path) -> Result<T, Failure>,
 ) -> Result<T, Failure> {
     let failed = |error: io::Error| format!("{}: {error}", out.display());
-    // The folder itself where `out` is a link to it or ends in `..`, as only that can be renamed.
+    refuse_link(out)?;
+    // The folder itself where `out` ends in `..`, as only that can be renamed.
     let target = out.canonicalize().unwrap_or_else(|_| out.to_owned());
     let is_there = target.is_dir();
     if target.exists() && (!is_there || target.read_dir().map_err(failed)?.next().is_some()) {
@@ -219,13 +225,13 @@ pub(crate) fn write_folder<T>(
 
 /// Writes a file in one piece.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    staged(path, bytes)?.persist(path).map_err(|error| format!("{}: {}", path.display(), error.error))?;
+    staged(path, bytes)?.persist(path).map_err(|error| format!("{}: {error}", path.display()))?;
     Ok(())
 }
 
 /// A temporary file beside `path`, with the permissions of any other file of the user, that is to become
 /// `path`.
-fn staged(path: &Path, bytes: &[u8]) -> Result<NamedTempFile, Failure> {
+fn staged(path: &Path, bytes: &[u8]) -> Result<StagedFile, Failure> {
     let folder = folder_of(path);
     if !folder.is_dir() {
         return Err(format!("{}: there is no folder {}", path.display(), folder.display()).into());

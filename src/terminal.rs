@@ -5,7 +5,7 @@ use std::error::Error;
 use std::fmt;
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -16,19 +16,24 @@ use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, P
 use serde::Serialize;
 
 use crate::plain_text::{printable, printable_json, printable_message};
+use crate::signals::Signals;
 use crate::sparse_lines::SparseLines;
+use crate::standard_output::StandardOutput;
 use crate::watch::Watch;
 
 /// Why a subcommand failed: one line for the user.
 pub(crate) type Failure = Box<dyn Error>;
 
-/// Exit code of a program that Ctrl-C has ended, by convention 128 + SIGINT.
+/// Exit code of a command that was stopped, by convention 128 + SIGINT; another signal has its own
+/// ([`Signals::exit_code`]).
 pub(crate) const INTERRUPTED: u8 = 130;
 
 /// The terminal as the user's flags ask for it, or what a calling program is told in its place.
 pub(crate) struct Terminal {
     pub(crate) json: bool,
     pub(crate) quiet: bool,
+    output: StandardOutput,
+    signals: Arc<Signals>,
     transcript: Option<Transcript>,
 }
 
@@ -64,13 +69,14 @@ const RULES: TableStyle = {
 const TABLE_WIDTH: u16 = 100;
 
 impl Terminal {
-    pub(crate) const fn new(json: bool, quiet: bool) -> Self {
-        Self { json, quiet, transcript: None }
+    pub(crate) fn new(json: bool, quiet: bool, signals: Arc<Signals>) -> Self {
+        Self { json, quiet, output: StandardOutput::default(), signals, transcript: None }
     }
 
     /// Nothing is printed: [`Self::into_transcript`] has it.
     pub(crate) fn transcript(watch: Arc<Watch>) -> Self {
-        Self { json: true, quiet: false, transcript: Some(Transcript { watch, printed: Mutex::default() }) }
+        let transcript = Some(Transcript { watch, printed: Mutex::default() });
+        Self { transcript, ..Self::new(true, false, Arc::default()) }
     }
 
     /// The document, the remarks and the failure that were kept.
@@ -80,30 +86,39 @@ impl Terminal {
             .unwrap_or_default()
     }
 
-    /// Set when the command is to stop: by a calling program, or by Ctrl-C where `on_ctrl_c`. A second Ctrl-C
-    /// ends at once.
-    pub(crate) fn stop_flag(&self, on_ctrl_c: bool) -> Arc<AtomicBool> {
-        if let Some(transcript) = &self.transcript {
-            return transcript.watch.stop_flag();
+    /// Set when the command is to stop: by a calling program, or by a signal where `on_signal`, which ends the
+    /// process at once otherwise.
+    pub(crate) fn stop_flag(&self, on_signal: bool) -> Arc<AtomicBool> {
+        match &self.transcript {
+            Some(transcript) => transcript.watch.stop_flag(),
+            None if on_signal => self.signals.stop_flag(self.quiet),
+            None => Arc::default(),
         }
-        let stop = Arc::new(AtomicBool::new(false));
-        if on_ctrl_c {
-            let flag = Arc::clone(&stop);
-            let _ = ctrlc::set_handler(move || {
-                if flag.swap(true, Ordering::Relaxed) {
-                    std::process::exit(INTERRUPTED.into());
-                }
-            });
-        }
-        stop
     }
 
     /// A result for people; not printed beside JSON.
     pub(crate) fn say(&self, text: &str) -> Result<(), Failure> {
         if !self.json {
-            writeln_to_stdout(&printable(text))?;
+            self.print(format!("{}\n", printable(text)).as_bytes());
         }
         Ok(())
+    }
+
+    /// Bytes on standard output as they are. Where they cannot be written, the command goes on, since files
+    /// are results too, and [`Self::exit_code`] says so at its end.
+    pub(crate) fn print(&self, text: &[u8]) {
+        self.output.print(text);
+    }
+
+    /// The exit code of a command that ended with `code`, and the message where its output is not all there.
+    pub(crate) fn exit_code(&self, code: u8) -> u8 {
+        match self.output.failed() {
+            Some(why) if code != 1 => {
+                self.failure(&why);
+                self.signals.exit_code(1)
+            }
+            _ => self.signals.exit_code(code),
+        }
     }
 
     /// The one JSON document, when it is asked for.
@@ -112,7 +127,7 @@ impl Terminal {
             let text = serde_json::to_string_pretty(document)?;
             match &self.transcript {
                 Some(transcript) => transcript.printed().document = Some(text),
-                None => writeln_to_stdout(&printable_json(&text))?,
+                None => self.print(format!("{}\n", printable_json(&text)).as_bytes()),
             }
         }
         Ok(())
@@ -138,6 +153,9 @@ impl Terminal {
         let message = in_plain_words(&printable_message(&message.replace('\n', "; ")));
         if let Some(transcript) = &self.transcript {
             transcript.printed().failure = Some(message);
+            return;
+        }
+        if self.signals.is_ending() {
             return;
         }
         let _ = writeln!(anstream::stderr(), "{ERROR}error{ERROR:#}: {message}");
@@ -231,15 +249,6 @@ fn in_plain_words(message: &str) -> String {
         ("entity not found", "there is no folder in which it could be made"),
     ];
     WORDS.iter().fold(message.to_owned(), |message, (system, plain)| message.replace(system, plain))
-}
-
-/// Writes a line. A reader that has gone away (`| head`) is no failure, and stops nothing else: files are
-/// still written and the exit code still says what it has to say.
-fn writeln_to_stdout(text: &str) -> Result<(), Failure> {
-    match writeln!(std::io::stdout().lock(), "{text}") {
-        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
-        result => result.map_err(|error| format!("standard output: {error}").into()),
-    }
 }
 
 /// A table whose first `left` columns are text and whose others are numbers.

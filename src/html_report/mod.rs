@@ -25,7 +25,7 @@ use dataset::Dataset;
 use report_page::{MadeBy, Report};
 
 use crate::command_line;
-use crate::simulate::write_whole;
+use crate::simulate::{refuse_link, write_whole};
 use crate::terminal::Failure;
 
 /// The file's name in every folder.
@@ -33,6 +33,7 @@ const FILE: &str = "report.html";
 
 /// Refuses what is no folder, before anything is computed.
 pub(crate) fn refuse_file(out: Option<&Path>) -> Result<(), Failure> {
+    out.map_or(Ok(()), refuse_link)?;
     match out.filter(|out| out.exists() && !out.is_dir()) {
         Some(file) => {
             Err(format!("{}: it is a file, where a folder belongs; choose another name", file.display()).into())
@@ -43,7 +44,7 @@ pub(crate) fn refuse_file(out: Option<&Path>) -> Result<(), Failure> {
 
 /// Writes the page into a folder, which is made where it is not there.
 fn write(report: &Report, out: &Path) -> Result<(), Failure> {
-    std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
+    atomic_file::create_folder(out).map_err(|error| format!("{}: {error}", out.display()))?;
     write_whole(&out.join(FILE), report.render()?.as_bytes())
 }
 

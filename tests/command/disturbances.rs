@@ -50,9 +50,9 @@ fn a_full_disk_is_said_and_what_was_there_stays() {
         "export c c.toml --out model.h --force --quiet",
         &sweep,
     ] {
-        // No file grows beyond two kilobytes, or four where a block of the shell has 1024 bytes; without the
-        // trap the signal of it would end the command.
-        let ended = shell(here, &format!("trap '' XFSZ; ulimit -f 4; exec \"$0\" {line}"));
+        // No file grows beyond two kilobytes, or four where a block of the shell has 1024 bytes; the signal of
+        // it ends no command.
+        let ended = shell(here, &format!("ulimit -f 4; exec \"$0\" {line}"));
         failed(&ended, line);
         assert!(ended.stderr.to_lowercase().contains("file too large"), "{line}: {}", ended.stderr);
         // The file is named by the place that it was to have.
@@ -71,14 +71,47 @@ fn a_full_disk_is_said_and_what_was_there_stays() {
 #[test]
 fn output_that_nobody_takes_is_a_failure() {
     let temp = tempfile::tempdir().expect("a folder");
-    for command in ["calibrate", "evaluate", "check", "diagnose"] {
-        for flags in ["", "--json --quiet"] {
-            let line = format!("exec \"$0\" {command} {ROOT}/tests/evo/robot {flags} > /dev/full");
-            let ended = shell(temp.path(), &line);
+    let here = temp.path();
+    let robot = format!("{ROOT}/tests/evo/robot");
+    succeed(here, &["calibrate", &robot, "--out", "c.toml"]);
+    let mut lines: Vec<String> = ["--help", "--version", "man", "completions bash", "export c c.toml"]
+        .map(str::to_owned)
+        .into_iter()
+        .chain(["calibrate", "evaluate", "check", "diagnose"].map(|command| format!("{command} {robot}")))
+        .chain([format!("simulate {ROOT}/scenarios/motion-capture.toml --force --out new")])
+        .collect();
+    let documents = lines[5..].iter().map(|line| format!("{line} --json --quiet")).collect::<Vec<_>>();
+    lines.extend(documents);
+    for line in lines {
+        // A full disk, and none at all. What is thrown away on purpose is none.
+        for (output, why) in [("> /dev/full", "No space left"), (">&-", "closed")] {
+            let ended = shell(here, &format!("exec \"$0\" {line} {output}"));
             failed(&ended, &line);
-            assert!(ended.stderr.contains("standard output"), "{line}: {}", ended.stderr);
+            let said = ended.stderr.matches("error: ").count();
+            assert!(said == 1 && ended.stderr.contains("standard output: "), "{line} {output}: {}", ended.stderr);
+            assert!(ended.stderr.contains(why), "{line} {output}: {}", ended.stderr);
         }
+        let ended = shell(here, &format!("exec \"$0\" {line} 1<> /dev/null"));
+        assert_eq!(ended.code, Some(0), "{line}: {}", ended.stderr);
     }
+    // What was to be written is there all the same.
+    assert!(here.join("new/dataset.toml").is_file() && here.join("new.truth.json").is_file());
+}
+
+/// What is there already and may be replaced changes no byte of a page.
+#[test]
+fn pages_have_the_same_bytes_whatever_is_replaced() {
+    let temp = tempfile::tempdir().expect("a folder");
+    let here = temp.path();
+    let robot = format!("{ROOT}/tests/evo/robot");
+    let page = |words: &[&str]| {
+        succeed(here, &[&["diagnose", &robot, "--out", "found", "--quiet"], words].concat());
+        fs::read(here.join("found/report.html")).expect("a page")
+    };
+    let first = page(&[]);
+    assert!(first == page(&["--force"]), "the page tells of --force");
+    let command = "yair diagnose";
+    assert!(String::from_utf8_lossy(&first).contains(command), "the page tells its command");
 }
 
 #[test]

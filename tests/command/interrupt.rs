@@ -1,18 +1,16 @@
-//! Ctrl-C while results are written: what has its final name is whole, or it is not there.
+//! Ctrl-C and SIGTERM while results are written: what has its final name is whole or not there, nothing is left
+//! beside it, and the exit code tells the signal.
 
 use std::fmt::Write as _;
 use std::fs;
-use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
 use crate::support::{everything_in, succeed};
 
-/// The signal of Ctrl-C.
-const SIGINT: i32 = 2;
-/// What a shell has for it, and what a command gives that tidies up first.
-const INTERRUPTED: i32 = 128 + SIGINT;
+/// Signals with what a command gives that tidies up first, as a shell has it for them.
+const SIGNALS: [(&str, i32); 2] = [("-INT", 130), ("-TERM", 143)];
 
 /// A shell starts what runs in its background deaf to the signal, and what that starts inherits it.
 fn start(here: &Path, arguments: &[&str]) -> Child {
@@ -26,8 +24,8 @@ fn start(here: &Path, arguments: &[&str]) -> Child {
         .expect("yair starts")
 }
 
-/// Interrupts a command as soon as `is_time`; `None` where it ended before.
-fn interrupted(here: &Path, arguments: &[&str], is_time: impl Fn() -> bool) -> Option<ExitStatus> {
+/// Sends a signal to a command as soon as `is_time`; `None` where it ended before.
+fn interrupted(here: &Path, signal: &str, arguments: &[&str], is_time: impl Fn() -> bool) -> Option<ExitStatus> {
     let mut child = start(here, arguments);
     while !is_time() {
         if let Some(ended) = child.try_wait().expect("it can be asked") {
@@ -36,14 +34,9 @@ fn interrupted(here: &Path, arguments: &[&str], is_time: impl Fn() -> bool) -> O
         }
         std::thread::sleep(Duration::from_micros(200));
     }
-    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill");
+    let sent = Command::new("kill").args([signal, &child.id().to_string()]).status().expect("kill");
     assert!(sent.success());
     Some(child.wait().expect("it ends"))
-}
-
-#[track_caller]
-fn is_of_the_signal(ended: ExitStatus) {
-    assert!(ended.signal() == Some(SIGINT) || ended.code() == Some(INTERRUPTED), "{ended}");
 }
 
 /// A folder that is being made has this name, beside the one that it will have.
@@ -70,12 +63,12 @@ fn an_import_that_is_interrupted_leaves_no_dataset() {
     fs::write(here.join("log.csv"), long_table(150_000)).expect("written");
     let arguments = ["import", "csv", "log.csv", "--out", "new", "--wheel", "0.15", "--base", "0.3"];
     let arguments = [&arguments[..], &["--ticks-per-rev", "4096", "--time-unit", "s", "--angle-unit", "rad"]].concat();
-    let ended = interrupted(here, &arguments, || is_being_written(here)).expect("it is seen at its work");
-    is_of_the_signal(ended);
-    assert!(!here.join("new").exists(), "{:?}", everything_in(here));
-    // What is left of it stops nobody, and the next one takes it away.
+    for (signal, code) in SIGNALS {
+        let ended = interrupted(here, signal, &arguments, || is_being_written(here)).expect("it is seen at its work");
+        assert_eq!(ended.code(), Some(code), "{signal}: {ended}");
+        assert_eq!(everything_in(here), [here.join("log.csv")], "{signal}");
+    }
     succeed(here, &arguments);
-    assert!(!is_being_written(here), "{:?}", everything_in(here));
     assert!(["dataset.toml", "odometry.csv", "truth.csv"].iter().all(|name| here.join("new").join(name).is_file()));
 }
 
@@ -86,9 +79,11 @@ fn a_diagnosis_that_is_interrupted_leaves_no_folder() {
     let scenario = concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/motion-capture.toml");
     succeed(here, &["simulate", scenario, "--out", "robot"]);
     let arguments = ["diagnose", "robot", "--out", "found", "--quiet"];
-    let ended = interrupted(here, &arguments, || is_being_written(here)).expect("it is seen at its work");
-    is_of_the_signal(ended);
-    assert!(!here.join("found").exists(), "{:?}", everything_in(here));
+    for (signal, code) in SIGNALS {
+        let ended = interrupted(here, signal, &arguments, || is_being_written(here)).expect("it is seen at its work");
+        assert_eq!(ended.code(), Some(code), "{signal}: {ended}");
+        assert!(!here.join("found").exists() && !is_being_written(here), "{:?}", everything_in(here));
+    }
 }
 
 #[test]
@@ -97,12 +92,15 @@ fn a_sweep_that_is_interrupted_has_no_results_and_goes_on() {
     let here = temp.path();
     let scenario = concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/noise-levels.toml");
     let arguments = ["sweep", scenario, "--trials", "400", "--out", "sweep", "--quiet"];
-    // The state is the first file that a campaign writes.
-    let begun = || here.join("sweep").read_dir().is_ok_and(|mut entries| entries.next().is_some());
-    let ended = interrupted(here, &arguments, begun).expect("it is seen at its work");
-    is_of_the_signal(ended);
+    // A campaign takes its folder first.
+    let begun = || here.join("sweep/sweep.lock").exists();
     let results = ["sweep.json", "sweep.svg", "report.html"].map(|name| here.join("sweep").join(name));
-    assert!(results.iter().all(|file| !file.exists()), "{:?}", everything_in(here));
+    for (signal, code) in SIGNALS {
+        let resumed = [&arguments[..], if signal == SIGNALS[0].0 { &[] } else { &["--resume"] }].concat();
+        let ended = interrupted(here, signal, &resumed, begun).expect("it is seen at its work");
+        assert_eq!(ended.code(), Some(code), "{signal}: {ended}");
+        assert!(!begun() && results.iter().all(|file| !file.exists()), "{:?}", everything_in(here));
+    }
     succeed(here, &[&arguments[..], &["--resume"]].concat());
     assert!(results.iter().all(|file| file.is_file()), "{:?}", everything_in(here));
 }

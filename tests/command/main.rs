@@ -25,6 +25,8 @@ mod interrupt;
 #[cfg(unix)]
 mod kills;
 mod limits;
+#[cfg(unix)]
+mod links;
 mod pages;
 mod partial;
 mod pose_errors;

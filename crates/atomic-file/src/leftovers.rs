@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use tempfile::{NamedTempFile, TempDir};
 
 use crate::lock::{is_still_at, keeps_others_out, opened};
+use crate::under_way::{UnderWay, begun};
 
 /// How the name of a file or folder under way begins.
 pub const PREFIX: &str = ".writing-";
@@ -36,6 +37,8 @@ pub struct WorkFolder {
     /// Given up before the folder is taken away: not every system removes a file that is open.
     _lock: Option<File>,
     folder: TempDir,
+    /// Dropped last.
+    _under_way: UnderWay,
 }
 
 impl WorkFolder {
@@ -48,7 +51,10 @@ impl WorkFolder {
         for _ in 0..MAX_TURNS {
             // The folder that tempfile makes is private to the user; the one inside gets the usual
             // permissions.
+            let mut begun = begun();
             let folder = tempfile::Builder::new().prefix(PREFIX).tempdir_in(parent)?;
+            let under_way = UnderWay::listed(&mut begun, folder.path());
+            drop(begun);
             let path = folder.path().join(LOCK);
             let lock = match opened(&path) {
                 // Empty still, it has been taken for a leftover.
@@ -59,7 +65,7 @@ impl WorkFolder {
             if lock.lock().is_err() || is_still_at(&lock, &path) {
                 let made = folder.path().join(MADE);
                 fs::create_dir(&made)?;
-                return Ok(Self { made, _lock: Some(lock), folder });
+                return Ok(Self { made, _lock: Some(lock), folder, _under_way: under_way });
             }
         }
         Err(io::Error::other("what is written there is taken away by another process"))
@@ -85,6 +91,8 @@ impl WorkFolder {
     /// The system's; the other one is then as it was.
     pub fn replace(self, target: &Path) -> io::Result<()> {
         let old = self.folder.path().join(REPLACED);
+        // No end of the process comes between the two.
+        let _begun = begun();
         fs::rename(target, &old)?;
         fs::rename(&self.made, target).inspect_err(|_| {
             // Back as it was; when not even that works, the first reason is still the one to tell.
@@ -107,17 +115,45 @@ fn empty(folder: &Path) {
     }
 }
 
+/// A file that is being written, to be renamed into its place. Dropped before, it leaves nothing.
+#[derive(Debug)]
+pub struct StagedFile {
+    file: NamedTempFile,
+    /// Dropped last.
+    _under_way: UnderWay,
+}
+
+impl StagedFile {
+    /// The file to write into.
+    #[must_use]
+    pub fn as_file(&self) -> &File {
+        self.file.as_file()
+    }
+
+    /// Puts the file into its place; one that was there before is replaced.
+    ///
+    /// # Errors
+    /// The system's; what was there before is then unharmed.
+    pub fn persist(self, path: &Path) -> io::Result<()> {
+        self.file.persist(path)?;
+        Ok(())
+    }
+}
+
 /// A locked file inside of `folder` under a name of its own.
-pub(crate) fn locked_file(folder: &Path) -> io::Result<NamedTempFile> {
+pub(crate) fn locked_file(folder: &Path) -> io::Result<StagedFile> {
     for _ in 0..MAX_TURNS {
         let mut builder = tempfile::Builder::new();
         builder.prefix(PREFIX);
         // As readable as any other file of the user; temporary files are private.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        let mut begun = begun();
         let file = builder.tempfile_in(folder)?;
+        let under_way = UnderWay::listed(&mut begun, file.path());
+        drop(begun);
         if file.as_file().lock().is_err() || is_still_at(file.as_file(), file.path()) {
-            return Ok(file);
+            return Ok(StagedFile { file, _under_way: under_way });
         }
     }
     Err(io::Error::other("what is written there is taken away by another process"))
@@ -194,7 +230,7 @@ mod tests {
         let left = names(here);
         assert!([".writing-caught", ".writing-other", "notes"].iter().all(|name| left.contains(&(*name).to_owned())));
         assert_eq!(left.len(), 5, "{left:?}");
-        assert!(mine.made().is_dir() && file.path().is_file());
+        assert!(mine.made().is_dir() && file.file.path().is_file());
         // The next one in the same place does the same, and nothing of these two is left when they end.
         fs::write(here.join(".writing-file"), "half").expect("written");
         drop((WorkFolder::beside(here).expect("made"), mine, file));

@@ -3,23 +3,24 @@
 
 mod leftovers;
 pub mod lock;
+mod under_way;
 
 use std::fs::File;
 use std::io::{self, Read, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-pub use leftovers::{PREFIX, WorkFolder, remove_leftovers};
-use tempfile::NamedTempFile;
+pub use leftovers::{PREFIX, StagedFile, WorkFolder, remove_leftovers};
+pub use under_way::{UnderWay, remove_all_under_way};
 
 /// A temporary file beside `path` that holds `bytes` and is to become `path` by `persist`. It has the
 /// permissions of any other file of the user.
 ///
 /// # Errors
 /// The system's, when the folder of `path` is not there or cannot be written.
-pub fn stage(path: &Path, bytes: &[u8]) -> io::Result<NamedTempFile> {
+pub fn stage(path: &Path, bytes: &[u8]) -> io::Result<StagedFile> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut file = leftovers::locked_file(folder)?;
-    file.write_all(bytes)?;
+    let file = leftovers::locked_file(folder)?;
+    file.as_file().write_all(bytes)?;
     Ok(file)
 }
 
@@ -28,8 +29,7 @@ pub fn stage(path: &Path, bytes: &[u8]) -> io::Result<NamedTempFile> {
 /// # Errors
 /// As [`stage`].
 pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    stage(path, bytes)?.persist(path)?;
-    Ok(())
+    stage(path, bytes)?.persist(path)
 }
 
 /// Reads a file of at most `max_bytes`.
@@ -51,22 +51,59 @@ pub fn read_at_most(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
     if bytes.len() as u64 > max_bytes { Err(too_long()) } else { Ok(bytes) }
 }
 
-/// Makes a folder inside of `out`; a link in its place, which may lead anywhere, is refused.
+/// Makes a folder of results with its parents; a link in its place, which may lead anywhere, is refused.
 ///
 /// # Errors
 /// The system's, and [`io::ErrorKind::AlreadyExists`] where there is a link.
+pub fn create_folder(folder: &Path) -> io::Result<()> {
+    refuse_link(folder)?;
+    std::fs::create_dir_all(folder)
+}
+
+/// Makes a folder inside of `out`; no part of its path, and not `out` itself, may be a link.
+///
+/// # Errors
+/// As [`create_folder`].
 pub fn create_inside(out: &Path, folder: &Path) -> io::Result<()> {
     let mut path = out.to_owned();
-    std::fs::create_dir_all(&path)?;
+    create_folder(&path)?;
     for part in folder {
         path.push(part);
-        if path.is_symlink() {
-            let why = format!("{} is a link, and results stay inside of {}", path.display(), out.display());
-            return Err(io::Error::new(io::ErrorKind::AlreadyExists, why));
-        }
-        std::fs::create_dir_all(&path)?;
+        create_folder(&path)?;
     }
     Ok(())
+}
+
+/// Refuses a link where a folder of results is to be.
+///
+/// # Errors
+/// [`io::ErrorKind::AlreadyExists`] with what the link leads to.
+pub fn refuse_link(folder: &Path) -> io::Result<()> {
+    // Without a slash at its end, behind which the system follows a link.
+    let folder: PathBuf = folder.components().collect();
+    match std::fs::read_link(&folder) {
+        Ok(target) => {
+            let why = format!(
+                "the folder is a link to {}, and results are not written through links; name the folder itself",
+                target.display()
+            );
+            Err(io::Error::new(io::ErrorKind::AlreadyExists, why))
+        }
+        Err(_) => Ok(()),
+    }
+}
+
+/// Where a file of a folder leads, if it is a link to outside of that folder: input comes from anywhere, and
+/// what it does not hold itself is not read in its name.
+///
+/// # Errors
+/// The system's, when the folder is not there.
+pub fn link_outside(folder: &Path, file: &Path) -> io::Result<Option<PathBuf>> {
+    if !file.is_symlink() {
+        return Ok(None);
+    }
+    let folder = folder.canonicalize()?;
+    Ok(file.canonicalize().ok().filter(|target| !target.starts_with(&folder)))
 }
 
 #[cfg(test)]
@@ -90,6 +127,10 @@ mod tests {
         std::os::unix::fs::symlink(other.path(), out.path().join("sessions")).expect("a link");
         let refused = create_inside(out.path(), Path::new("sessions/deep")).expect_err("a link");
         assert!(refused.to_string().contains("is a link"), "{refused}");
+        for link in ["sessions", "sessions/", "sessions/."] {
+            let refused = create_folder(&out.path().join(link)).expect_err("a link");
+            assert!(refused.to_string().contains(&other.path().display().to_string()), "{refused}");
+        }
         assert_eq!(other.path().read_dir().expect("readable").count(), 0);
         create_inside(out.path(), Path::new("plain/deep")).expect("made");
         // A file that is a link is replaced, not written through.

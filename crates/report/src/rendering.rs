@@ -40,7 +40,7 @@ impl Figure {
             ("svg", svg.into_bytes()),
         ];
         let at = |path: &Path, source| ReportError::Write { path: path.to_owned(), source };
-        std::fs::create_dir_all(dir).map_err(|error| at(dir, error))?;
+        atomic_file::create_folder(dir).map_err(|error| at(dir, error))?;
         let mut paths = Vec::with_capacity(forms.len());
         for (extension, bytes) in forms {
             let path = dir.join(format!("{stem}.{extension}"));

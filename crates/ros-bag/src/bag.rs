@@ -44,9 +44,11 @@ impl Bag {
             };
         }
         let metadata = path.join("metadata.yaml");
+        refuse_link_outside(path, &metadata)?;
         if !metadata.exists() {
             // A recorder that was killed has written none.
             let files = files_of(path)?;
+            files.iter().try_for_each(|file| refuse_link_outside(path, file))?;
             let count = files.len();
             let remark = format!(
                 "{}: no metadata.yaml; its {count} files were read as one bag, in the order of their names",
@@ -64,6 +66,7 @@ impl Bag {
         }
         let named = found.files.iter().map(|name| path.join(Path::new(name).file_name().unwrap_or_default()));
         let (files, missing): (Vec<PathBuf>, Vec<PathBuf>) = named.partition(|file| file.is_file());
+        files.iter().try_for_each(|file| refuse_link_outside(path, file))?;
         if files.is_empty() {
             let why = format!("none of its files is there: {}", found.files.join(", "));
             return Err(RosBagError::Metadata { file: metadata, why });
@@ -140,6 +143,15 @@ fn visit_file(file: &Path, visit: Visit<'_>, losses: &mut Losses) -> Result<(), 
 
 fn no_bag(path: &Path, why: &str) -> RosBagError {
     RosBagError::NoBag { path: path.to_owned(), why: why.to_owned() }
+}
+
+/// A bag comes from anywhere; what its folder does not hold itself is not read in its name.
+fn refuse_link_outside(folder: &Path, file: &Path) -> Result<(), RosBagError> {
+    let outside = atomic_file::link_outside(folder, file);
+    match outside.map_err(|source| RosBagError::Io { path: folder.to_owned(), source })? {
+        Some(target) => Err(RosBagError::LinkOutside { file: file.to_owned(), target }),
+        None => Ok(()),
+    }
 }
 
 /// The files of a folder, `bag_2.mcap` before `bag_10.mcap`.

@@ -22,6 +22,14 @@ pub enum RosBagError {
         /// What it is instead.
         why: String,
     },
+    /// A file of a bag's folder is a link to elsewhere.
+    #[error("{file}: a link to {target}, outside of the bag; put a copy of the file there, or name {target}")]
+    LinkOutside {
+        /// The link.
+        file: PathBuf,
+        /// What it leads to.
+        target: PathBuf,
+    },
     /// `metadata.yaml` does not say what rosbag2 writes there.
     #[error("{file}: {why}; name one .mcap file instead, or let `ros2 bag reindex` write it anew")]
     Metadata {

@@ -8,6 +8,7 @@ use std::fs::{File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 
+use atomic_file::UnderWay;
 use atomic_file::lock::{is_still_at, keeps_others_out, opened};
 
 use crate::error::BenchError;
@@ -24,6 +25,7 @@ pub struct FolderLock {
     file: Option<File>,
     path: PathBuf,
     why_not_held: Option<String>,
+    _under_way: UnderWay,
 }
 
 impl FolderLock {
@@ -39,6 +41,8 @@ impl FolderLock {
             why: format!("cannot write results there: {}", error.kind()),
         };
         let in_use = || BenchError::InUse { path: folder.display().to_string() };
+        atomic_file::refuse_link(folder)
+            .map_err(|error| BenchError::Write { path: folder.display().to_string(), why: error.to_string() })?;
         std::fs::create_dir_all(folder).map_err(unwritable)?;
         for _ in 0..MAX_TURNS {
             let file = opened(&path).map_err(unwritable)?;
@@ -46,15 +50,20 @@ impl FolderLock {
                 Ok(()) if !is_still_at(&file, &path) => {}
                 Ok(()) => {
                     let why_not_held = keeps_others_out(&path).err().map(|error| error.to_string());
-                    return Ok(Self { file: Some(file), path, why_not_held });
+                    return Ok(Self::held(file, path, why_not_held));
                 }
                 Err(TryLockError::WouldBlock) => return Err(in_use()),
                 Err(TryLockError::Error(error)) => {
-                    return Ok(Self { file: Some(file), path, why_not_held: Some(error.to_string()) });
+                    return Ok(Self::held(file, path, Some(error.to_string())));
                 }
             }
         }
         Err(in_use())
+    }
+
+    fn held(file: File, path: PathBuf, why_not_held: Option<String>) -> Self {
+        let _under_way = UnderWay::of(&path);
+        Self { file: Some(file), path, why_not_held, _under_way }
     }
 
     /// Why the lock keeps nobody out, where it does not: some network file systems know no locks.

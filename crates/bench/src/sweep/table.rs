@@ -38,7 +38,7 @@ pub fn write_merged(merged: &Merged, dir: &Path) -> Result<(), BenchError> {
 }
 
 fn write_all(plan: &SweepPlan, result: &SweepResult, spools: &[PathBuf], dir: &Path) -> Result<(), BenchError> {
-    std::fs::create_dir_all(dir).map_err(|error| failed(dir, &error))?;
+    atomic_file::create_folder(dir).map_err(|error| failed(dir, &error))?;
     let mut json = serde_json::to_vec_pretty(result).map_err(|error| failed(dir, &error))?;
     json.push(b'\n');
     let csv = csv_bytes(result).map_err(|error| failed(dir, &error))?;
@@ -69,6 +69,7 @@ pub fn can_be_written(dir: &Path, rows: bool) -> Result<(), BenchError> {
     if rows && cfg!(not(feature = "parquet")) {
         return Err(BenchError::NoParquet);
     }
+    atomic_file::refuse_link(dir).map_err(|error| failed(dir, &error))?;
     let probe = || {
         std::fs::create_dir_all(dir)?;
         atomic_file::remove_leftovers(dir);

@@ -145,15 +145,10 @@ impl Opened {
 /// A dataset comes from anywhere; what it does not hold itself is not read in its name.
 fn refuse_links_outside(dir: &Path) -> Result<(), DatasetError> {
     let io = |source| DatasetError::Io { path: dir.to_owned(), source };
-    let folder = dir.canonicalize().map_err(io)?;
     for entry in dir.read_dir().map_err(io)? {
         let file = entry.map_err(io)?.path();
         let is_part = file.extension().is_some_and(|extension| extension == "csv" || extension == "toml");
-        if is_part
-            && file.is_symlink()
-            && let Ok(target) = file.canonicalize()
-            && !target.starts_with(&folder)
-        {
+        if is_part && let Some(target) = atomic_file::link_outside(dir, &file).map_err(io)? {
             return Err(DatasetError::LinkOutside { file, target });
         }
     }

@@ -175,8 +175,9 @@ fn io_error(path: &Path, source: io::Error) -> DatasetError {
     DatasetError::Io { path: path.to_owned(), source }
 }
 
-/// The folder itself where `dir` is a link to it or ends in `..`, as only that can be renamed.
+/// The folder itself where `dir` ends in `..`, as only that can be renamed.
 fn resolved(dir: &Path) -> Result<PathBuf, DatasetError> {
+    atomic_file::refuse_link(dir).map_err(|source| io_error(dir, source))?;
     match dir.canonicalize() {
         Ok(target) => Ok(target),
         Err(error) if error.kind() == io::ErrorKind::NotFound && dir.file_name().is_some() => Ok(dir.to_owned()),
