@@ -393,9 +393,11 @@ fn export_dataset(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         (Some(out), _) => {
             // All names before the first file.
             let files = texts.iter().map(|(id, _)| file_of(out, id, TUM, &place)).collect::<Result<Vec<_>, _>>()?;
-            std::fs::create_dir_all(out).map_err(|error| format!("{}: {}", out.display(), error.kind()))?;
+            atomic_file::create_folder(out).map_err(|error| format!("{}: {}", out.display(), error.kind()))?;
+            atomic_file::remove_leftovers(out);
             for (file, (_, text)) in files.iter().zip(&texts) {
-                write_whole(file, text.as_bytes())?;
+                atomic_file::write_whole(file, text.as_bytes())
+                    .map_err(|error| format!("{}: {}", file.display(), error.kind()))?;
             }
             terminal.say(&format!("{} runs in {}", texts.len(), out.display()))?;
             None

@@ -4,6 +4,8 @@
 mod accuracy_gate;
 mod bad_input;
 mod bad_logs;
+#[cfg(unix)]
+mod bounds;
 mod cluster;
 mod compare;
 mod contract;

@@ -28,6 +28,7 @@ use crate::mean_structure::{THINNED, mean_structure};
 use crate::plan::{Limits, next_experiment};
 use crate::record_faults::{Fault, determines_wheels, fault, is_correlated, rejected_share, sessions};
 use crate::residuals::{Residuals, residuals};
+use crate::settings::large_log::MAX_RUNS;
 use crate::settings::records::{
     MAX_REJECTED_FRACTION, MIN_COMMON_CLOCK_OFFSET_S, MIN_MEASUREMENTS_PER_RUN, MIN_REJECTING_CLOCK_OFFSET_S,
 };
@@ -82,6 +83,12 @@ pub enum DiagnoseError {
         "the fit of the calibrated model did not converge: these runs hardly determine it; yair check says what they do not determine"
     )]
     NotConverged,
+    /// So many runs take more memory and time than a diagnosis is to.
+    #[error("{runs} runs, and a diagnosis is of at most {MAX_RUNS}; give fewer sessions")]
+    TooManyRuns {
+        /// Of all datasets.
+        runs: usize,
+    },
     /// There is no base fit.
     #[error("no calibrated model to ask: {0}")]
     NoFit(#[from] EstimationError),
@@ -161,6 +168,10 @@ fn diagnose_rows(
 ) -> Result<Diagnosis, DiagnoseError> {
     if let Some(id) = options.without.iter().find(|id| !CATALOGUE.contains(&id.as_str())) {
         return Err(DiagnoseError::UnknownEffect { id: id.clone() });
+    }
+    let runs = datasets.iter().map(|dataset| dataset.runs.len()).sum();
+    if runs > MAX_RUNS {
+        return Err(DiagnoseError::TooManyRuns { runs });
     }
     let stages = |before_fit: BeforeFit| stages((datasets, large), options, before_fit);
     let mut before_fit = BeforeFit { min_common_clock_s: MIN_COMMON_CLOCK_OFFSET_S, events: true };

@@ -1,6 +1,8 @@
 //! The instrument's extrinsics and latency, common to all or for each session or run: they join the model
 //! when they predict held-out runs.
 
+use std::collections::BTreeMap;
+
 use kinematics::Pose;
 use nalgebra::DVector;
 
@@ -239,21 +241,14 @@ fn units_of(fit: &ModelFit<'_>, grouping: Option<Grouping>, gate: OutlierGate) -
     };
     // Blocks come block by block, runs in their order: neighbours, and the parts of a run, are in different
     // folds.
-    let mut measured: Vec<((usize, usize), usize)> = Vec::new();
+    let mut folds: BTreeMap<(usize, usize), usize> = BTreeMap::new();
     parts
         .into_iter()
         .enumerate()
         .map(|(number, equations)| {
-            let fold = match measured.iter_mut().find(|(run, _)| *run == equations.run) {
-                Some((_, fold)) => {
-                    *fold += 1;
-                    *fold % FOLDS
-                }
-                None => {
-                    measured.push((equations.run, number % FOLDS));
-                    number % FOLDS
-                }
-            };
+            let next = folds.get(&equations.run).map_or(number % FOLDS, |fold| fold + 1);
+            folds.insert(equations.run, next);
+            let fold = next % FOLDS;
             Unit { fold, equations }
         })
         .collect()

@@ -20,3 +20,7 @@ pub(crate) const MAX_FAULTY_STRETCHES: usize = 4;
 /// The fractional part of its multiples is spread over [0, 1) more evenly than that of any other number's.
 /// Derived: the golden section, (√5 − 1)/2.
 pub(crate) const GOLDEN_SECTION: f64 = 0.618_033_988_749_894_9;
+
+/// Number. Most runs of a diagnosis.
+/// Budgeted: a run takes half a megabyte and 4 ms of a core, however short it is.
+pub(crate) const MAX_RUNS: usize = 10_000;

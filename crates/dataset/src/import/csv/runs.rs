@@ -1,5 +1,6 @@
 //! Runs from the rows of logs: by a column, a file each, or cut where the robot stands still.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::columns::{Log, Roles};
@@ -37,27 +38,31 @@ pub(super) fn runs(parts: &[Part], options: &Options) -> Result<(Vec<RawRun>, St
     let mut runs = Vec::new();
     for (number, &part) in with_wheels.iter().enumerate() {
         let base = if with_wheels.len() > 1 { stem(&parts[part].sheet.file) } else { "run-01".to_owned() };
-        for mut run in groups(&parts[part], part, &base)? {
-            find_truth(parts, &with_wheels, number, &mut run);
-            runs.push(run);
-        }
+        runs.extend(groups(&parts[part], part, &base)?.into_iter().map(|run| (number, run)));
     }
-    // A truth that is one file for several runs is theirs by its times.
+    let poses: Vec<PoseRows<'_>> = parts.iter().map(PoseRows::of).collect();
+    let truths: Vec<usize> = (0..parts.len()).filter(|part| !with_wheels.contains(part)).collect();
     let many = runs.len() > 1;
-    for run in &mut runs {
-        if let (Some(&first), Some(&last)) = (run.rows.first(), run.rows.last()) {
-            let (log, truth) = (&parts[run.part].log, &parts[run.truth_part]);
-            let (from, to) = (log.time[first], log.time[last]);
-            let shared = many
-                && run.truth_part != run.part
-                && truth.log.run.is_empty()
-                && count_of_truths(parts, &with_wheels) == 1;
-            if shared {
-                run.truth_rows.retain(|&row| (from..=to).contains(&truth.log.time[row]));
+    for (number, run) in &mut runs {
+        let (Some(&first), Some(&last)) = (run.rows.first(), run.rows.last()) else { continue };
+        let time = &parts[run.part].log.time;
+        let (from, to) = (time[first], time[last]);
+        if parts[run.part].roles.has_pose() {
+            run.truth_part = run.part;
+            run.truth_rows = poses[run.part].of_own(&run.id);
+        } else {
+            // As many files of either kind belong together in the order in which they were given.
+            let paired = truths.get(*number).filter(|_| truths.len() == with_wheels.len()).or(truths.first());
+            if let Some(&truth) = paired {
+                run.truth_part = truth;
+                // A truth that is one file for several runs is theirs by its times.
+                let times = (many && truths.len() == 1).then_some((from, to));
+                run.truth_rows = poses[truth].of_run(&run.id, times);
             }
-            refuse_other_clock(parts, run, from, to)?;
         }
+        refuse_other_clock(parts, run, from, to)?;
     }
+    let mut runs: Vec<RawRun> = runs.into_iter().map(|(_, run)| run).collect();
     let mut ordered_by = describe(parts, &with_wheels);
     if let Some(cut_s) = options.cut_s {
         runs = runs.into_iter().flat_map(|run| cut(parts, run, cut_s)).collect();
@@ -69,10 +74,6 @@ pub(super) fn runs(parts: &[Part], options: &Options) -> Result<(Vec<RawRun>, St
     }
     in_time_order(parts, &runs)?;
     Ok((runs, ordered_by))
-}
-
-fn count_of_truths(parts: &[Part], with_wheels: &[usize]) -> usize {
-    (0..parts.len()).filter(|part| !with_wheels.contains(part)).count()
 }
 
 fn describe(parts: &[Part], with_wheels: &[usize]) -> String {
@@ -110,31 +111,56 @@ fn groups(part: &Part, number: usize, base: &str) -> Result<Vec<RawRun>, Dataset
     Ok(runs)
 }
 
-/// The rows that saw a run: of its own file, else of a file of its own run's name or place.
-fn find_truth(parts: &[Part], with_wheels: &[usize], number: usize, run: &mut RawRun) {
-    let own = &parts[run.part];
-    if own.roles.has_pose() {
-        run.truth_part = run.part;
-        let of_run = own.log.run_names.iter().position(|name| *name == run.id).unwrap_or(0) as u32;
-        run.truth_rows = pose_rows(own).filter(|&row| own.log.run_of(row) == of_run).collect();
-        return;
-    }
-    let truths: Vec<usize> = (0..parts.len()).filter(|part| !with_wheels.contains(part)).collect();
-    // As many files of either kind belong together in the order in which they were given.
-    let paired = truths.get(number).filter(|_| truths.len() == with_wheels.len()).or(truths.first());
-    let Some(&truth) = paired else { return };
-    let log = &parts[truth].log;
-    run.truth_part = truth;
-    let of_run = log.run_names.iter().position(|name| *name == run.id);
-    run.truth_rows = match (log.run.is_empty(), of_run) {
-        (true, _) => pose_rows(&parts[truth]).collect(),
-        (false, Some(of_run)) => pose_rows(&parts[truth]).filter(|&row| log.run_of(row) == of_run as u32).collect(),
-        (false, None) => Vec::new(),
-    };
+/// The rows of a file that saw a run, found without looking at all of them for each run.
+struct PoseRows<'p> {
+    part: &'p Part,
+    /// By the number of the run; all of them where the file has no column of runs.
+    by_run: Vec<Vec<usize>>,
+    numbers: BTreeMap<&'p str, usize>,
+    /// By their times, where the file has no column of runs.
+    by_time: Vec<usize>,
 }
 
-fn pose_rows(part: &Part) -> impl Iterator<Item = usize> {
-    (0..part.log.time.len()).filter(|&row| part.log.has_pose_at(row))
+impl<'p> PoseRows<'p> {
+    fn of(part: &'p Part) -> Self {
+        let log = &part.log;
+        let mut by_run = vec![Vec::new(); log.run_names.len().max(1)];
+        for row in (0..log.time.len()).filter(|&row| log.has_pose_at(row)) {
+            by_run[log.run_of(row) as usize].push(row);
+        }
+        let mut numbers = BTreeMap::new();
+        for (number, name) in log.run_names.iter().enumerate() {
+            numbers.entry(name.as_str()).or_insert(number);
+        }
+        let mut by_time = if log.run.is_empty() { by_run[0].clone() } else { Vec::new() };
+        by_time.sort_by_key(|&row| log.time[row]);
+        Self { part, by_run, numbers, by_time }
+    }
+
+    /// Of a run of this file.
+    fn of_own(&self, id: &str) -> Vec<usize> {
+        self.by_run[self.numbers.get(id).copied().unwrap_or(0)].clone()
+    }
+
+    /// Of another file's run: by its name, or between two `times` where this file has no column of runs.
+    fn of_run(&self, id: &str, times: Option<(i128, i128)>) -> Vec<usize> {
+        let time = &self.part.log.time;
+        match (self.part.log.run.is_empty(), times) {
+            (true, Some((from, to))) => {
+                let mut rows = between(&self.by_time, time, (from, to)).to_vec();
+                rows.sort_unstable();
+                rows
+            }
+            (true, None) => self.by_run[0].clone(),
+            (false, _) => self.numbers.get(id).map_or_else(Vec::new, |&number| self.by_run[number].clone()),
+        }
+    }
+}
+
+/// Those rows of a list in the order of their times that are between two times.
+fn between<'r>(by_time: &'r [usize], time: &[i128], (from, to): (i128, i128)) -> &'r [usize] {
+    let rows = &by_time[by_time.partition_point(|&row| time[row] < from)..];
+    &rows[..rows.partition_point(|&row| time[row] <= to)]
 }
 
 /// Two files whose times do not meet have two clocks.
@@ -215,6 +241,9 @@ fn cut(parts: &[Part], run: RawRun, cut_s: f64) -> Vec<RawRun> {
     };
     let step_s = |from: usize, to: usize| seconds(part.log.time[run.rows[from]], part.log.time[run.rows[to]]);
     let stand = |from: usize, to: usize| stands(run.rows[from], run.rows[to]);
+    let time = &truth.log.time;
+    let mut by_time = run.truth_rows.clone();
+    by_time.sort_by_key(|&row| time[row]);
     let mut pieces: Vec<RawRun> = Vec::new();
     for piece in moving_pieces(run.rows.len(), step_s, stand, cut_s) {
         let rows: Vec<usize> = run.rows[piece].to_vec();
@@ -222,11 +251,17 @@ fn cut(parts: &[Part], run: RawRun, cut_s: f64) -> Vec<RawRun> {
         let (from, to) = (part.log.time[first], part.log.time[last]);
         // In one file time may restart: its poses stand beside their odometry.
         let is_own = run.truth_part == run.part;
-        let belongs =
-            |row: usize| (!is_own || (first..=last).contains(&row)) && (from..=to).contains(&truth.log.time[row]);
-        let truth_rows: Vec<usize> = run.truth_rows.iter().copied().filter(|&row| belongs(row)).collect();
+        let mut truth_rows: Vec<usize> = if is_own {
+            let beside = &run.truth_rows[run.truth_rows.partition_point(|&row| row < first)..];
+            let beside = beside.iter().copied().take_while(|&row| row <= last);
+            beside.filter(|&row| (from..=to).contains(&time[row])).collect()
+        } else {
+            between(&by_time, time, (from, to)).to_vec()
+        };
+        truth_rows.sort_unstable();
         if truth_rows.len() >= 2 {
-            pieces.push(RawRun { start: from, rows, truth_rows, ..run.clone() });
+            let (part, truth_part) = (run.part, run.truth_part);
+            pieces.push(RawRun { id: String::new(), part, rows, truth_part, truth_rows, start: from });
         }
     }
     for (number, piece) in (1..).zip(&mut pieces) {
