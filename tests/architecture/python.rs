@@ -57,3 +57,19 @@ fn python_has_the_workspaces_version_and_forbids_unsafe_code() {
     assert_eq!(python["lints"]["rust"]["unsafe_code"].as_str(), Some("forbid"));
     assert_eq!(workspace["workspace"]["exclude"], Value::Array(vec!["python".into()]));
 }
+
+/// What tests in Python download is what was looked at once.
+#[test]
+fn every_package_that_tests_in_python_need_has_its_hashes() {
+    for of in ["requirements", "requirements-cluster"] {
+        let locked = text(format!("python/tests/{of}.txt")).replace("\\\n", " ");
+        let packages: Vec<&str> = locked.lines().filter(|line| !line.starts_with('#')).collect();
+        let is_pinned = |line: &&str| line.contains("==") && line.contains(" --hash=sha256:");
+        let open: Vec<_> = packages.iter().filter(|line| !is_pinned(line)).collect();
+        assert!(open.is_empty(), "{of}.txt: {open:?}");
+        for asked in text(format!("python/tests/{of}.in")).lines() {
+            assert!(packages.iter().any(|line| line.starts_with(&format!("{asked} "))), "{of}.txt has no {asked}");
+        }
+        assert!(text(".ci/run").contains(&format!("--require-hashes --requirement python/tests/{of}.txt")));
+    }
+}
