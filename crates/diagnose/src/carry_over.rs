@@ -112,6 +112,17 @@ struct Contrast {
 }
 
 impl Contrast {
+    /// Of a unit's size and that of the others, in the sense of the others.
+    fn of((own, others): (f64, f64), covariance: &DMatrix<f64>) -> Option<Self> {
+        let variance = covariance[(0, 0)] - covariance[(0, 1)] + 0.25 * covariance[(1, 1)];
+        let (sigma, sigma_of_others) = (variance.sqrt(), covariance[(1, 1)].sqrt());
+        (sigma > 0.0 && sigma_of_others > 0.0).then(|| Self {
+            value: (others.signum() * (own - 0.5 * others), sigma),
+            sigmas_of_others: others.abs() / sigma_of_others,
+            power_sigmas: 0.5 * others.abs() / sigma,
+        })
+    }
+
     fn is_testable(&self) -> bool {
         self.sigmas_of_others >= MIN_SIGMAS_OF_OTHERS && self.power_sigmas >= MIN_POWER_SIGMAS
     }
@@ -229,15 +240,7 @@ fn sizes_by_unit(model: &AugmentedModel<'_>, candidate: usize, units: &Units, le
     };
     let contrast = |unit: usize| {
         let (shares, covariance) = system.shares(2, |run| unit_of(run).map(|of| usize::from(of != unit)))?;
-        let (own, others) = (shares[0], shares[1]);
-        let sign = others.signum();
-        let variance = covariance[(0, 0)] - covariance[(0, 1)] + 0.25 * covariance[(1, 1)];
-        let (sigma, sigma_of_others) = (variance.sqrt(), covariance[(1, 1)].sqrt());
-        (sigma > 0.0 && sigma_of_others > 0.0).then(|| Contrast {
-            value: (sign * (own - 0.5 * others), sigma),
-            sigmas_of_others: others.abs() / sigma_of_others,
-            power_sigmas: 0.5 * others.abs() / sigma,
-        })
+        Contrast::of((shares[0], shares[1]), &covariance)
     };
     let of_units: Vec<UnitShare> = units
         .names
@@ -403,6 +406,19 @@ pub(crate) mod tests {
             Contrast { value: (0.5, 0.1), sigmas_of_others, power_sigmas }.is_testable()
         };
         assert!(is_testable(3.0, 2.93) && !is_testable(2.99, 10.0) && !is_testable(10.0, 2.92));
+    }
+
+    /// A size that is negative in all units carries over, and one whose sign differs in a unit does not.
+    #[test]
+    fn a_contrast_counts_in_the_sense_of_the_others() {
+        let covariance = DMatrix::from_row_slice(2, 2, &[0.04, 0.01, 0.01, 0.04]);
+        for sign in [1.0, -1.0] {
+            let of = |own: f64| Contrast::of((sign * own, sign), &covariance).expect("determined");
+            // 0.04 − 0.01 + 0.04/4 = 0.04.
+            assert!((of(1.0).value.0 - 0.5).abs() < 1e-15 && (of(1.0).value.1 - 0.2).abs() < 1e-15);
+            assert!((of(-1.0).value.0 + 1.5).abs() < 1e-15);
+            assert!((of(1.0).sigmas_of_others - 5.0).abs() < 1e-12 && (of(1.0).power_sigmas - 2.5).abs() < 1e-12);
+        }
     }
 
     #[test]

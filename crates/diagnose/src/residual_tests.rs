@@ -68,12 +68,17 @@ pub(crate) fn check(model: &AugmentedModel<'_>) -> Checked {
     });
     // Innovations that are all 0, or beyond all bounds, have no correlation and no mean square to test.
     checks.retain(|check| check.statistic.is_finite() && check.p_value.is_finite());
-    let fails = holm(&checks.iter().map(|check| check.p_value).collect::<Vec<_>>(), CHECKS_LEVEL);
-    checks.iter_mut().zip(fails).for_each(|(check, fails)| check.passes = !fails);
+    judge(&mut checks);
     let is_displaced = fit.records.segments.iter().all(Segment::is_displacement);
     let fails_to_be_white = checks.iter().any(|test| test.check.is_of_whiteness() && !test.passes);
     let autocorrelated = is_displaced && fails_to_be_white && correlation.1.abs() > WHITENESS_Z;
     Checked { autocorrelated, checks, correlation, outliers }
+}
+
+/// Which checks pass, all of them together at one level.
+fn judge(checks: &mut [TestResult]) {
+    let fails = holm(&checks.iter().map(|check| check.p_value).collect::<Vec<_>>(), CHECKS_LEVEL);
+    checks.iter_mut().zip(fails).for_each(|(check, fails)| check.passes = !fails);
 }
 
 /// The tests of the innovations alone, by formula.
@@ -303,9 +308,9 @@ mod tests {
     use estimation::{FitSettings, ModelFit};
     use kinematics::{Increment, Pose, Wheels};
 
-    use super::{anscombe_glynn, outliers, residual_persistence, whiteness};
+    use super::{CHECKS_LEVEL, anscombe_glynn, judge, outliers, residual_persistence, whiteness};
     use crate::augmented_model::AugmentedModel;
-    use crate::check::ResidualPersistence;
+    use crate::check::{Check, ResidualPersistence, TestResult};
     use crate::small_robot::dataset_of;
     use crate::{Options, Verdict, diagnose};
 
@@ -378,6 +383,31 @@ mod tests {
 
     fn fitted(dataset: &Dataset) -> ModelFit<'_> {
         FitSettings::GEOMETRY_ONLY.fit(&[dataset.session()]).expect("a fit")
+    }
+
+    /// Of ten checks one fails by itself at a tenth of the level; each for itself, all would be tried at the
+    /// whole of it, and one sound log in forty would be refused.
+    #[test]
+    fn checks_are_judged_together() {
+        let passes = |p_values: &[f64]| {
+            let check = |p_value: &f64| TestResult {
+                check: Check::RunToRun,
+                statistic: 1.0,
+                p_value: p_value * CHECKS_LEVEL,
+                passes: true,
+            };
+            let mut checks: Vec<TestResult> = p_values.iter().map(check).collect();
+            judge(&mut checks);
+            checks.iter().map(|check| check.passes).collect::<Vec<_>>()
+        };
+        let mut p_values = [0.9; 10];
+        assert_eq!(passes(&p_values), [true; 10]);
+        p_values[3] = 0.09;
+        assert!(!passes(&p_values)[3] && passes(&p_values).iter().filter(|passes| **passes).count() == 9);
+        // The next is judged among the nine that are left.
+        p_values[7] = 0.105;
+        assert!(!passes(&p_values)[7]);
+        assert_eq!(passes(&[0.9]), [false]);
     }
 
     #[test]

@@ -55,6 +55,7 @@ mod predicted_information;
 mod products;
 mod profile;
 mod propagation;
+mod quantum;
 mod rate_noise;
 mod rate_rounding;
 mod recorded_rates;

@@ -26,6 +26,7 @@ use crate::partial_records::PartialSegment;
 use crate::pass_options::OutlierGate;
 use crate::products::{Products, Sums};
 use crate::propagation::{Moved, Propagator};
+use crate::quantum::variance_of_rounding;
 use crate::rounding::PoseVariance;
 use crate::settings::{
     GYRO_BIAS_SIGMA_RADPS, LIDAR_PLACE_SIGMA_M, MIN_DISTANCE_M, PARTIAL_OUTLIER_CHI_SQUARE, RESTART_AFTER_OUTLIERS,
@@ -327,7 +328,7 @@ impl<'f> PartialFilter<'f> {
                 self.by[(at + k, column)] = self.by[(k, column)];
             }
         }
-        let variance_rad2 = self.segment.segment.quantum_rad.map(|rad| rad * rad / 12.0);
+        let variance_rad2 = self.segment.segment.quantum_rad.map(variance_of_rounding);
         let variance_rad2 = variance_rad2.zip_with(place.interpolated_rad2, |rounded, between| rounded + between);
         let rounding = PoseVariance::of(variance_rad2, model).in_room(self.state[2]);
         for (row, column) in (0..9).map(|k| (k / 3, k % 3)) {

@@ -14,6 +14,7 @@
 use kinematics::{Increment, Wheels};
 
 use crate::model::Model;
+use crate::quantum::variance_of_rounding;
 use crate::rounding::PoseVariance;
 use crate::segment::{MeasuredPose, Segment};
 use crate::settings::{MAX_INTERPOLATED_VARIANCE_RATIO, MAX_SHARED_VARIANCE_RATIO, MIN_POSES_NEAR_ROWS};
@@ -84,7 +85,7 @@ fn variance(interval: &WheelInterval, quantum_rad: Wheels<f64>, nominal: &Model)
     let rounded_rad2 = if interval.stands || interval.rate_rad_s == Wheels::both(0.0) {
         Wheels::both(0.0)
     } else {
-        quantum_rad.map(|rad| rad * rad / 12.0)
+        quantum_rad.map(variance_of_rounding)
     };
     PoseVariance::of(rounded_rad2.zip_with(interval.interpolated_rad2[1], |a, b| a + b), nominal)
 }

@@ -19,6 +19,7 @@ use crate::model_fit::ModelFit;
 use crate::optimizer::Solution;
 use crate::pass::Pass;
 use crate::propagation::{CarriedState, Propagator};
+use crate::quantum::variance_of_rounding;
 use crate::rate_noise::RateNoise;
 use crate::recorded_rates::RecordedRate;
 use crate::rounding::PoseVariance;
@@ -36,7 +37,8 @@ impl ModelFit<'_> {
             // A displacement has the error within a row where the one before ended, too.
             let shared = segment.intervals.first().filter(|_| segment.continues);
             let shared_rad2 = shared.map_or(Wheels::both(0.0), |first| first.interpolated_rad2[0]);
-            let at_ends_rad2 = segment.quantum_rad.zip_with(shared_rad2, |rad, shared| rad * rad / 12.0 + shared);
+            let at_ends_rad2 =
+                segment.quantum_rad.zip_with(shared_rad2, |rad, shared| variance_of_rounding(rad) + shared);
             let at_ends = PoseVariance::of(at_ends_rad2, &self.solution.model);
             let [along_m2, turn_rad2] = segment.variance_of_rates(&self.solution.model);
             at_ends.along_m2 + along_m2 > MIN_RESIMULATED_VARIANCE_RATIO * position_m2

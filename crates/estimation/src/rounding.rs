@@ -23,6 +23,7 @@ use crate::derivatives::Derivatives;
 use crate::filter_state::{FilterState, Step};
 use crate::model::Model;
 use crate::noise::NOISES;
+use crate::quantum::variance_of_rounding;
 use crate::settings::MIN_ROUNDING_VARIANCE_RATIO;
 
 /// Which pose the filter carries.
@@ -76,7 +77,7 @@ impl PoseVariance {
 
     /// Of counts that stand for these angles.
     pub(crate) fn of_rounding(quantum_rad: Wheels<f64>, model: &Model) -> Self {
-        Self::of(quantum_rad.map(|rad| rad * rad / 12.0), model)
+        Self::of(quantum_rad.map(variance_of_rounding), model)
     }
 
     /// Does it matter beside measurements of these variances of position and heading?
@@ -123,7 +124,7 @@ impl Rounding {
     /// Of counts that stand for these angles. `columns` are those of the derivatives.
     pub(crate) fn new(quantum_rad: Wheels<f64>, columns: usize) -> Self {
         Self {
-            variance_rad2: quantum_rad.map(|rad| rad * rad / 12.0),
+            variance_rad2: quantum_rad.map(variance_of_rounding),
             carries: Carries::OfCounts,
             by: Derivatives::zeros(columns),
             covariance_by: Covariances::ZERO,

@@ -10,6 +10,7 @@
 
 use kinematics::Wheels;
 
+use crate::quantum::variance_of_rounding;
 use crate::settings::{
     GAP_RATIO, GENTLE_ACCELERATION_M_S2, MAX_EXACT_JITTER, MAX_ROUNDING_S, MAX_ROW_RATE_NOISE, MAX_STEADY_ROW_S,
     MIN_BEAT_JITTER, MIN_GRID_FRACTION, MIN_GRID_STEPS, MIN_QUANTUM_RAD, QUANTUM_TOLERANCE, RATE_NOISE_FRACTION,
@@ -71,7 +72,7 @@ impl WheelRates {
         let quanta = [quantum_rad.left, quantum_rad.right];
         // Variance of a row's angle over the speed at its stamp: rounding, and speed times the stamp's error.
         let mean_square = [0, 1].map(|side| mean_square_rate(t_s, turns[side]));
-        let variance = [0, 1].map(|side| quanta[side].powi(2) / 12.0 + mean_square[side] * jitter_s * jitter_s);
+        let variance = [0, 1].map(|side| variance_of_rounding(quanta[side]) + mean_square[side] * jitter_s * jitter_s);
         let row_by_row = stretch_s > 0.0
             && [0, 1]
                 .iter()
@@ -83,7 +84,7 @@ impl WheelRates {
             variance.map(|variance| variance / squares)
         };
         let noise = |half: usize| over_window(variance, half);
-        let rounding = quanta.map(|quantum| quantum.powi(2) / 12.0);
+        let rounding = quanta.map(variance_of_rounding);
         let mut rates = of_window(RATE_WINDOWS[0]);
         let mut half_rows = RATE_WINDOWS[0];
         for pair in RATE_WINDOWS.windows(2) {

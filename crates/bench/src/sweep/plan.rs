@@ -350,3 +350,47 @@ fn true_value(trial: &Trial, parameter: Parameter) -> f64 {
         _ => geometry.wheel_separation_m(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use motion_programs::Schedule;
+
+    use super::*;
+
+    /// Draws that come twice, in another trial, chunk or point, make trials look like more than they are.
+    #[test]
+    fn no_trial_of_a_sweep_has_the_draws_of_another() {
+        // Marks are read to the last digit, so that no two trials give the same estimates by chance. What
+        // points differ in changes nothing where motors follow exactly.
+        let text = scenario::PAPER
+            .replace("resolution_m = 0.001", "resolution_m = 0.0")
+            .replace(
+                "\"noise.wheel_sigma_m_per_sqrt_m\" = [0.0, 0.0005, 0.001]",
+                "\"robot.motor.supply_v\" = [24.0, 25.0, 26.0]",
+            )
+            .replace("\"instrument.floor_grid.reading_sigma_m\" = [0.0, 0.0005, 0.001, 0.002]", "");
+        let mut paper = Scenario::parse(&text, "paper.toml").expect("a scenario");
+        paper.protocols =
+            vec![Schedule::Straights { length_m: 0.5, runs: 4 }, Schedule::Spins { turn_rad: 6.0, runs: 4 }];
+        let sweep = paper.sweep.as_mut().expect("the paper sweeps");
+        sweep.methods = vec!["direct".to_owned()];
+        let plan =
+            SweepPlan::new(&paper, SweepOptions { trials: Some(64), ..SweepOptions::default() }).expect("a plan");
+        assert_eq!((plan.points.len(), plan.chunks()), (3, 4));
+        let mut seen = BTreeSet::new();
+        let mut trials = 0;
+        for point in 0..plan.points.len() {
+            let mut setup = PointSetup::new(&plan, point).expect("a setup");
+            for chunk in 0..plan.chunks() {
+                let found = setup.drive(&plan, chunk).expect("driven");
+                for outcomes in found.outcomes.chunks(plan.estimates()) {
+                    seen.insert(outcomes.iter().map(|outcome| outcome.value.to_bits()).collect::<Vec<_>>());
+                    trials += 1;
+                }
+            }
+        }
+        assert_eq!((trials, seen.len()), (64 * plan.points.len(), trials));
+    }
+}

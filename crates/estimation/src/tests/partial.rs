@@ -281,6 +281,26 @@ fn straights_by_tape_and_a_whole_turn_that_is_come_back_from_determine_the_robot
     assert!(fit.solution.model.gyro_scale.abs() < 10.0 * NOISELESS);
 }
 
+/// Fifty standard deviations are the tape's end in another hole; two are as they happen.
+#[test]
+fn a_tape_that_is_far_off_is_rejected_and_moves_nothing() {
+    let log = |off: f64| {
+        dataset(GYRO, |run, poses| {
+            let of_one = if run.info.id == "run-0" { off } else { 0.0 };
+            tape(run, poses, [20, 120], of_one);
+            revisit(run, poses, [120, 210], 0.0);
+        })
+    };
+    let far = log(50.0);
+    let fit = fitted(&far);
+    let [outliers] = &fit.partial_outliers()[..] else { panic!("{:?}", fit.partial_outliers()) };
+    assert_eq!((outliers.run, &outliers.rejected[..]), ((0, 0), &[("taped distances", 1)][..]));
+    // Taken, it would move the wheels by more than a hundredth.
+    assert!(errors(&fit).iter().all(|error| error.abs() < 10.0 * NOISELESS), "{:?}", errors(&fit));
+    let near = log(2.0);
+    assert_eq!(fitted(&near).partial_outliers(), []);
+}
+
 #[test]
 fn rows_without_a_rate_leave_the_others_as_they_are() {
     let log = |missing: &[usize]| {
