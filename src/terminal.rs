@@ -86,8 +86,8 @@ impl Terminal {
             .unwrap_or_default()
     }
 
-    /// Set when the command is to stop: by a calling program, or by a signal where `on_signal`, which ends the
-    /// process at once otherwise.
+    /// Set when the command is to stop: by a calling program, or by a signal where `on_signal`, which ends
+    /// the process at once otherwise.
     pub(crate) fn stop_flag(&self, on_signal: bool) -> Arc<AtomicBool> {
         match &self.transcript {
             Some(transcript) => transcript.watch.stop_flag(),

@@ -50,8 +50,8 @@ fn a_full_disk_is_said_and_what_was_there_stays() {
         "export c c.toml --out model.h --force --quiet",
         &sweep,
     ] {
-        // No file grows beyond two kilobytes, or four where a block of the shell has 1024 bytes; the signal of
-        // it ends no command.
+        // No file grows beyond two kilobytes, or four where a block of the shell has 1024 bytes; its signal
+        // ends no command.
         let ended = shell(here, &format!("ulimit -f 4; exec \"$0\" {line}"));
         failed(&ended, line);
         assert!(ended.stderr.to_lowercase().contains("file too large"), "{line}: {}", ended.stderr);

@@ -1,5 +1,5 @@
-//! Ctrl-C and SIGTERM while results are written: what has its final name is whole or not there, nothing is left
-//! beside it, and the exit code tells the signal.
+//! Ctrl-C and SIGTERM while results are written: what has its final name is whole or not there, nothing is
+//! left beside it, and the exit code tells the signal.
 
 use std::fmt::Write as _;
 use std::fs;

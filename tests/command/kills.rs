@@ -1,6 +1,6 @@
-//! `kill -9` and SIGTERM at random instants: whatever is there afterwards is whole, doing it again or going on
-//! gives the bytes of an undisturbed run, and nothing is left of the process that was ended. SIGTERM leaves
-//! nothing in the first place.
+//! `kill -9` and SIGTERM at random instants: whatever is there afterwards is whole, doing it again or going
+//! on gives the bytes of an undisturbed run, and nothing is left of the process that was ended. SIGTERM
+//! leaves nothing in the first place.
 //!
 //! `cargo test` tries a few instants. `.ci/run kills` tries two hundred and sixty, with
 //! YAIR_KILLS_OF="sweep --shard" those of this command alone; docs/reliability.md has what came of them.
@@ -124,8 +124,8 @@ fn words(arguments: &[String]) -> Vec<&str> {
     arguments.iter().map(String::as_str).collect()
 }
 
-/// Ends a task at instants of its undisturbed time, one in each equal part; how often it was ended at work, and
-/// how often its folder was there by then.
+/// Ends a task at instants of its undisturbed time, one in each equal part; how often it was ended at work,
+/// and how often its folder was there by then.
 fn ended(here: &Path, task: &Task, signal: Signal, instants: u32, random: &mut Xoshiro256PlusPlus) -> (u32, u32) {
     let (name, number) = signal.name_and_number();
     let out = here.join(task.out);

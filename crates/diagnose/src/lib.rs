@@ -18,6 +18,7 @@ mod check;
 mod clock_drift;
 mod clock_offsets;
 mod clock_profile;
+mod contrast;
 mod covariate_tests;
 mod covariates;
 mod detectability;
