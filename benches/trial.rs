@@ -118,8 +118,8 @@ fn bound(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// What a trial costs beside stepping through it, beside the bare loop and beside trials side by side. In turn
-/// in every round: a busy machine slows all of them.
+/// What a trial costs beside stepping through it, beside the bare loop and beside trials side by side. In
+/// turn in every round: a busy machine slows all of them.
 #[allow(clippy::print_stdout)]
 fn ratios(_: &mut Criterion) {
     const ROUNDS: usize = 9;

@@ -156,10 +156,10 @@ fn a_scenario_without_estimates_is_the_model_of_its_robot() {
 /// Logs whose rows are stamped when a receiver gets to them: hertz, mean delay in seconds, rows in a packet.
 const BURSTS: [(f64, f64, usize); 4] = [(50.0, 5e-3, 1), (20.0, 5e-2, 1), (200.0, 2e-2, 1), (100.0, 0.0, 5)];
 
-/// A stamp that is late moves a pose by the motion in the meantime, and no effect of the catalogue by more: rows
-/// that were stamped together are no fast wheels. Delays of up to 0.3 s at up to 0.4 m/s are 0.12 m beside the same
-/// drives with exact stamps; 0.09 m are seen. Rejects speeds by the stamps, by which a slip that grows with the
-/// speed leaps by 4.2 m, and lateness that no tick tells, by 0.5 m.
+/// A stamp that is late moves a pose by the motion in the meantime, and no effect of the catalogue by more:
+/// rows that were stamped together are no fast wheels. Delays of up to 0.3 s at up to 0.4 m/s are 0.12 m
+/// beside the same drives with exact stamps; 0.09 m are seen. Rejects speeds by the stamps, by which a slip
+/// that grows with the speed leaps by 4.2 m, and lateness that no tick tells, by 0.5 m.
 #[test]
 fn regress_no_effect_leaps_where_rows_are_stamped_together() {
     let worst_m = |dataset: &Dataset, id: &str| {
@@ -179,7 +179,6 @@ fn regress_no_effect_leaps_where_rows_are_stamped_together() {
         });
         for id in effects::CATALOGUE {
             let (Some(bursts_m), Some(exact_m)) = (worst_m(&bursts, id), worst_m(&exact, id)) else { continue };
-            println!("{odometry_hz} Hz, {delay_s} s late, by {rows_per_packet}: {id} {bursts_m} m, {exact_m} m");
             assert!(
                 bursts_m < exact_m + 0.12,
                 "{odometry_hz} Hz, {delay_s} s late, by {rows_per_packet}: {id} {bursts_m} m, {exact_m} m"
@@ -188,9 +187,9 @@ fn regress_no_effect_leaps_where_rows_are_stamped_together() {
     }
 }
 
-/// What is reported, handed on and measured is one model: terms that are no findings are in neither of the gain, the
-/// calibration and the extended model. The stamps of the second case are undone roughly, and what they leave is no
-/// finding. Rejects the gain and the calibration of all terms that were fitted.
+/// What is reported, handed on and measured is one model: terms that are no findings are in neither of the
+/// gain, the calibration and the extended model. The stamps of the second case are undone roughly, and what
+/// they leave is no finding. Rejects the gain and the calibration of all terms that were fitted.
 #[test]
 fn regress_the_gain_is_of_what_is_reported_and_handed_on() {
     let hidden = "[[effect]]\nkind = \"term\"\nchannel = \"yaw\"\ncovariates = [\"v\", \"x\"]\ncoefficient = 0.02\n";
@@ -199,14 +198,6 @@ fn regress_the_gain_is_of_what_is_reported_and_handed_on() {
     for (effects, seed) in [(hidden.to_owned(), 80), (format!("{late}{hidden}"), 81), (late.to_owned(), 82)] {
         let dataset = simulated(&robot(&effects), seed);
         let found = diagnose(std::slice::from_ref(&dataset), &Options::default()).expect("a diagnosis");
-        println!(
-            "{seed}: {} found {} carried {} gain {:?} {:?}",
-            found.document.sentence,
-            found.found.terms().len(),
-            found.carried.terms().len(),
-            found.document.gain.as_ref().map(|g| g.log_score_per_observation),
-            found.document.gain_why_null
-        );
         has_left_out |= found.carried.terms().len() < found.found.terms().len();
         let extended = model(found.extended.as_ref().expect("a scenario"));
         let own = &found.document.calibration.methods[0].parameters;

@@ -185,9 +185,9 @@ fn a_khepera_has_rows_of_false_length_and_wheels_of_its_published_size() {
     }
 }
 
-/// Most people write a log a run, with counters that begin at zero: wheels that stand between the runs keep their
-/// angles all the same, and an eccentric wheel has one phase in all runs. Rejects a phase that begins anew in each
-/// run, by which nothing of it is found.
+/// Most people write a log a run, with counters that begin at zero: wheels that stand between the runs keep
+/// their angles all the same, and an eccentric wheel has one phase in all runs. Rejects a phase that begins
+/// anew in each run, by which nothing of it is found.
 #[test]
 fn regress_an_eccentric_wheel_is_as_plain_where_counters_begin_anew() {
     let robot = PlainRobot { eccentricity: 3e-3, ..PlainRobot::ordinary(3510) };

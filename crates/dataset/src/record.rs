@@ -176,8 +176,8 @@ pub struct Run {
     /// Distance that the robot had driven in the session before the run, metres; `None`: in the runs before
     /// it. No part of the format: who leaves runs or parts of them out sets it.
     pub session_m: Option<f64>,
-    /// What the wheels' angles are ahead of the counters' readings by, radians: counters may be set back between
-    /// runs, wheels keep their angles. No part of the format: readers set it
+    /// What the wheels' angles are ahead of the counters' readings by, radians: counters may be set back
+    /// between runs, wheels keep their angles. No part of the format: readers set it
     /// ([`Dataset::carry_wheel_angles`]).
     pub wheels_ahead_rad: Wheels<f64>,
 }

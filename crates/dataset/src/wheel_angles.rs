@@ -1,17 +1,19 @@
-//! Wheel angles that go on where counters begin anew: most robots set their counters to zero at the start of a
-//! log, and most people write a log a run.
+//! Wheel angles that go on where counters begin anew: most robots set their counters to zero at the start of
+//! a log, and most people write a log a run.
 //!
 //! A wheel keeps its angle between two runs that follow each other, so that what depends on the angle (an
-//! eccentric wheel) has one phase in all of them. A counter that reads at the start of a run what it read at the
-//! start of the run before, though the wheels turned since, was set back: the angle goes on from the end of the
-//! run before. A counter that went on says the angle by itself, also where the robot was driven between the logs.
+//! eccentric wheel) has one phase in all of them. A counter that reads at the start of a run what it read at
+//! the start of the run before, though the wheels turned since, was set back: the angle goes on from the end
+//! of the run before. A counter that went on says the angle by itself, also where the robot was driven
+//! between the logs.
 
 use kinematics::Wheels;
 
 use crate::record::{Dataset, NominalRobot, Run, WheelLog};
 
 /// Counters that read at the starts of two runs what is no farther apart were set back to the same value.
-/// Budgeted: the first row of a log comes some counts after its counter was set to zero; a phase that is off by
+/// Budgeted: the first row of a log comes some counts after its counter was set to zero; a phase that is off
+/// by
 /// 0.1 rad costs half a per cent of an amplitude.
 const SAME_START_RAD: f64 = 0.1;
 

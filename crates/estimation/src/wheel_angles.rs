@@ -161,8 +161,8 @@ impl<'a> WheelAngleInterpolator<'a> {
         &self.turn_rad
     }
 
-    /// The wheels' angles at the first row, by the counters and what they were set back by, radians; 0 for a robot
-    /// that reports only its twist.
+    /// The wheels' angles at the first row, by the counters and what they were set back by, radians; 0 for a
+    /// robot that reports only its twist.
     #[must_use]
     pub const fn first_rad(&self) -> Wheels<f64> {
         self.first_rad

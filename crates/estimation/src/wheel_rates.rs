@@ -256,9 +256,10 @@ fn apart(t_s: &[f64], least_row_s: impl Fn(usize) -> f64, wrong_share: f64) -> V
     apart_s
 }
 
-/// The least time from the reading of a row to that of the next: a share of the usual one, by the median of the rows
-/// around. Where most rows are stamped together with others, as in packets, the usual one is the mean over rows in
-/// which the wheels turn on: pauses in which they stand say nothing of the rows beside them.
+/// The least time from the reading of a row to that of the next: a share of the usual one, by the median of
+/// the rows around. Where most rows are stamped together with others, as in packets, the usual one is the
+/// mean over rows in which the wheels turn on: pauses in which they stand say nothing of the rows beside
+/// them.
 fn least_row_s<'t>(
     t_s: &'t [f64],
     turn_rad: &Wheels<Vec<f64>>,

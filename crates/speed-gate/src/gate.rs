@@ -67,8 +67,8 @@ impl Gate {
         self.measured.ratios.insert(format!("{}/{name}", self.program), ratio);
     }
 
-    /// Does what the arguments ask: compares with the baseline, or writes what was measured into it. Returns a
-    /// line for each ratio compared; none where nothing is asked.
+    /// Does what the arguments ask: compares with the baseline, or writes what was measured into it. Returns
+    /// a line for each ratio compared; none where nothing is asked.
     ///
     /// # Errors
     ///

@@ -2,9 +2,9 @@
 //!
 //! Model: rolling radius r(φ) = r (1 + ε sin(φ + φ₀)).
 //! Signature: e_dx and e_dθ locked to that wheel's phase, zero over whole turns.
-//! Observability: phase continuity and more than two samples a turn. Over runs the counters tell the phase, or,
-//! where they begin anew in each run, that a wheel keeps its angle between runs; one that is turned by hand
-//! meanwhile has another phase in each run, and its effect averages out.
+//! Observability: phase continuity and more than two samples a turn. Over runs the counters tell the phase,
+//! or, where they begin anew in each run, that a wheel keeps its angle between runs; one that is turned by
+//! hand meanwhile has another phase in each run, and its effect averages out.
 //! Alias: `encoder_cycle` with one cycle a turn, exactly.
 //! Reference: geometry of a circular wheel on an offset axis, to first order in the offset; 0.1 to 1 %, a
 //! rule of thumb.

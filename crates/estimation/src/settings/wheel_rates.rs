@@ -19,18 +19,18 @@ pub(crate) const RATE_ROUNDING_FRACTION: f64 = 0.01;
 pub(crate) const MAX_ROW_RATE_NOISE: f64 = 1e-3;
 
 /// Share of the usual row's length that rows are apart at the least when they were read.
-/// Derived: rows that a timer reads are a whole row apart; stamps that a scheduler delays by less than half a row
-/// are left as they are.
+/// Derived: rows that a timer reads are a whole row apart; stamps that a scheduler delays by less than half a
+/// row are left as they are.
 pub(crate) const MIN_ROW_SHARE: f64 = 0.5;
 
 /// The same of rows that are sent in packets.
-/// Derived: they are read by a timer too; a mean that is a twentieth too long, as some rows are lost, does not push
-/// one packet into the one before.
+/// Derived: they are read by a timer too; a mean that is a twentieth too long, as some rows are lost, does
+/// not push one packet into the one before.
 pub(crate) const MIN_PACKET_ROW_SHARE: f64 = 0.95;
 
 /// Mean row over the median row from which on rows are held to be sent in packets.
-/// Derived: of packets of four rows and more the median is nothing; of rows that a scheduler delays it is near the
-/// mean.
+/// Derived: of packets of four rows and more the median is nothing; of rows that a scheduler delays it is
+/// near the mean.
 pub(crate) const MAX_ROW_SPREAD: f64 = 3.0;
 
 /// Rows whose median is the usual row of a stretch of the log.

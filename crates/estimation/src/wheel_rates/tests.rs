@@ -100,8 +100,8 @@ fn rows_of_one_number_on_the_beat_have_rates() {
     assert!(rates.iter().all(|rate| rate.is_finite()), "{rates:?}");
 }
 
-/// A receiver that pauses for ten rows, and rows that are sent by five: the wheels turn at 3 rad/s throughout.
-/// Rejects speeds by the stamps, of 300 rad/s.
+/// A receiver that pauses for ten rows, and rows that are sent by five: the wheels turn at 3 rad/s
+/// throughout. Rejects speeds by the stamps, of 300 rad/s.
 #[test]
 fn regress_rows_that_are_stamped_together_are_no_fast_wheels() {
     let turns = Wheels::both((0..400).map(|row| 0.03 * f64::from(row)).collect::<Vec<f64>>());

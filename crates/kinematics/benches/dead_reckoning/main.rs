@@ -41,8 +41,8 @@ fn counts(steps: usize) -> Wheels<Vec<i64>> {
     Wheels { left: column(3), right: column(5) }
 }
 
-/// Times contenders in turn and prints each beside the first and beside the last. The ratios of a log that fills
-/// the caches, a step of which costs what it does in every longer log, are the gate's.
+/// Times contenders in turn and prints each beside the first and beside the last. The ratios of a log that
+/// fills the caches, a step of which costs what it does in every longer log, are the gate's.
 #[allow(clippy::print_stdout)]
 fn race(rule: &str, (steps, rounds): (usize, usize), contenders: &mut [Contender<'_>], gate: &mut Gate) {
     let race = Race::run(rounds, contenders);
