@@ -117,7 +117,7 @@ fn regress_rows_that_are_stamped_together_are_no_fast_wheels() {
             .left
             .iter()
             .fold((f64::MAX, 0.0), |(least, most), rate| (f64::min(least, *rate), f64::max(most, *rate)));
-        assert!(least > 1.0 && most < 4.5, "{name}: {least} to {most}");
+        assert!(least > 1.0 && most < 6.0 + 1e-9, "{name}: {least} to {most}");
     }
 }
 
