@@ -213,6 +213,7 @@ class _Sessions:
         self._folder = folder
 
     def add(self, files: dict[str, bytes]) -> None:
+        self._folder.mkdir(parents=True, exist_ok=True)
         for name, content in files.items():
             part = self._folder / f"{name}.part"
             part.write_bytes(content)
