@@ -13,8 +13,7 @@ use crate::record::{Dataset, NominalRobot, Run, WheelLog};
 
 /// Counters that read at the starts of two runs what is no farther apart were set back to the same value.
 /// Budgeted: the first row of a log comes some counts after its counter was set to zero; a phase that is off
-/// by
-/// 0.1 rad costs half a per cent of an amplitude.
+/// by 0.1 rad costs half a per cent of an amplitude.
 const SAME_START_RAD: f64 = 0.1;
 
 /// Follows the counters from run to run, in the order of the session.
@@ -61,23 +60,17 @@ impl Dataset {
 
 /// What the counters read at a log's first row and at its last, radians; `None` without counters.
 fn readings_rad(wheels: &WheelLog, robot: &NominalRobot) -> Option<[Wheels<f64>; 2]> {
-    let ends = |of: &dyn Fn(usize, bool) -> Option<f64>| {
-        let at = |is_last: bool| Some(Wheels { left: of(0, is_last)?, right: of(1, is_last)? });
-        Some([at(false)?, at(true)?])
-    };
+    fn ends<T: Copy>(columns: &Wheels<Vec<T>>, rad: impl Fn(T) -> f64) -> Option<[Wheels<f64>; 2]> {
+        let first = Wheels { left: *columns.left.first()?, right: *columns.right.first()? };
+        let last = Wheels { left: *columns.left.last()?, right: *columns.right.last()? };
+        Some([first.map(&rad), last.map(&rad)])
+    }
     match wheels {
         WheelLog::Ticks(ticks) => {
-            let rad = std::f64::consts::TAU / robot.ticks_per_rev?;
-            let columns = [&ticks.left, &ticks.right];
-            ends(&|side, is_last| {
-                let count = if is_last { columns[side].last() } else { columns[side].first() };
-                count.map(|count| *count as f64 * rad)
-            })
+            let rad_per_tick = std::f64::consts::TAU / robot.ticks_per_rev?;
+            ends(ticks, |count| count as f64 * rad_per_tick)
         }
-        WheelLog::Angles(angles) => {
-            let columns = [&angles.left, &angles.right];
-            ends(&|side, is_last| if is_last { columns[side].last() } else { columns[side].first() }.copied())
-        }
+        WheelLog::Angles(angles) => ends(angles, |angle_rad| angle_rad),
         WheelLog::Speeds(_) | WheelLog::Twist { .. } => None,
     }
 }
