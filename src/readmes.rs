@@ -62,5 +62,11 @@ pub struct Scenario;
 #[doc = include_str!("../crates/sim-yair/README.md")]
 pub struct SimYair;
 
+#[doc = include_str!("../crates/plain-robot/README.md")]
+pub struct PlainRobot;
+
+#[doc = include_str!("../crates/replay/README.md")]
+pub struct Replay;
+
 #[doc = include_str!("../crates/speed-gate/README.md")]
 pub struct SpeedGate;

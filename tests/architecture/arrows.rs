@@ -9,6 +9,7 @@ use crate::root;
 /// them the truth.
 pub(crate) const ARROWS: &[(&str, &[&str])] = &[
     ("speed-gate", &[]),
+    ("plain-robot", &[]),
     ("kinematics", &[]),
     ("atomic-file", &[]),
     ("dataset", &["kinematics", "atomic-file"]),
@@ -86,6 +87,24 @@ pub(crate) const ARROWS: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "replay",
+        &[
+            "kinematics",
+            "atomic-file",
+            "dataset",
+            "motion-programs",
+            "model-term",
+            "effects",
+            "scenario",
+            "sim-yair",
+            "estimation",
+            "calib",
+            "diagnose",
+            "plain-robot",
+            "blind-benchmark",
+        ],
+    ),
+    (
         "paper-reproduction",
         &[
             "kinematics",
@@ -125,6 +144,8 @@ pub(crate) const ARROWS: &[(&str, &[&str])] = &[
             "preflight",
             "export",
             "fleet",
+            "plain-robot",
+            "replay",
         ],
     ),
 ];

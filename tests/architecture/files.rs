@@ -98,6 +98,7 @@ fn nothing_reads_the_time_of_day() {
     with_instants.sort();
     let known = [
         "crates/bench/src/sweep/campaign.rs",
+        "crates/replay/src/build.rs",
         "crates/speed-gate/src/race.rs",
         "src/challenge.rs",
         "src/reproduce.rs",

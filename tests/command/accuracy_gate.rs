@@ -153,18 +153,16 @@ fn every_damage_is_caught() {
         ("rejection switched off", &KEEPS_OUTLIERS, "variance"),
     ];
     for (name, damaged, statistic) in damages {
-        for seed in FRESH..FRESH + 2 {
-            let check = check(&sweep(seed, (QUICK, 3, QUICK_TRIALS), Some(damaged)));
-            let caught = check.moved.iter().find(|number| number.statistic == statistic);
-            let caught = caught.unwrap_or_else(|| panic!("{name} is not caught: {:.1}", check.largest_z));
-            assert_eq!(caught.method, damaged.name(), "{name}");
-            // And only there: the other method stands.
-            assert!(check.moved.iter().all(|number| number.method == damaged.name()), "{name}");
-        }
+        let check = check(&sweep(FRESH, (QUICK, 3, QUICK_TRIALS), Some(damaged)));
+        let caught = check.moved.iter().find(|number| number.statistic == statistic);
+        let caught = caught.unwrap_or_else(|| panic!("{name} is not caught: {:.1}", check.largest_z));
+        assert_eq!(caught.method, damaged.name(), "{name}");
+        // And only there: the other method stands.
+        assert!(check.moved.iter().all(|number| number.method == damaged.name()), "{name}");
     }
 }
 
-/// The default method in the usual case.
+/// The default method in the usual case; that it passes without damage the gate itself says.
 #[test]
 fn a_sigma_of_joint_understated_by_15_per_cent_is_caught() {
     static UNDERSTATED: LazyLock<Damaged> = LazyLock::new(|| Damaged {
@@ -175,8 +173,6 @@ fn a_sigma_of_joint_understated_by_15_per_cent_is_caught() {
             }
         },
     });
-    let honest = check(&sweep(FRESH, (&["joint"], 1, None), None));
-    assert_eq!(honest.moved, []);
     let damaged = check(&sweep(FRESH, (&["joint"], 1, None), Some(&*UNDERSTATED)));
     assert!(damaged.moved.iter().any(|number| number.statistic == "coverage"), "{:.1}", damaged.largest_z);
 }

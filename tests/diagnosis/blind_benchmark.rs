@@ -73,19 +73,15 @@ fn holds(seed: u64, cases: &[CaseResult], alpha: f64) {
     assert!(named >= least(reported, NAMED, share), "{named} of {reported} named");
 }
 
-/// Of cases 0 to 39 of a seed all 14 nulls and 14 singles, and one pair and one effect that is left out, of
+/// Of cases 0 to 19 of a seed all 7 nulls and 7 singles, and one pair and one effect that is left out, of
 /// which nothing is asked here but an answer. CI's gate drives 440 cases of another seed.
 #[test]
 fn a_fixed_part_of_the_challenge_is_passed() {
     let seed = 20_260;
-    let cases = driven(seed, (0..40).filter(|number| number % 20 < NULLS_AND_SINGLES || [14, 16].contains(number)));
+    let cases = driven(seed, (0..20).filter(|number| number % 20 < NULLS_AND_SINGLES || [14, 16].contains(number)));
     let in_case_kind = |case_kind: CaseKind| cases.iter().filter(|case| case.case_kind == case_kind).count();
     // No robot may show an effect that was drawn for it, in a few cases in a hundred.
-    assert!(
-        in_case_kind(CaseKind::Null) == 14 && (11..=14).contains(&in_case_kind(CaseKind::Single)),
-        "{}",
-        cases.len()
-    );
+    assert!(in_case_kind(CaseKind::Null) == 7 && (5..=7).contains(&in_case_kind(CaseKind::Single)), "{}", cases.len());
     assert!(in_case_kind(CaseKind::Pair) > 0 && in_case_kind(CaseKind::LeftOut) > 0);
     holds(seed, &cases, 1e-3);
 }

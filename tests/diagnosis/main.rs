@@ -13,8 +13,6 @@ mod motion_capture;
 mod nested_gain;
 mod ordinary_kinds;
 mod ordinary_logs;
-#[path = "../support/plain_robot.rs"]
-mod plain_robot;
 mod plan;
 mod record_faults;
 mod report;

@@ -1,4 +1,4 @@
-//! Logs of robots that this project's simulator did not drive ([`crate::plain_robot`]): nothing is wrong with
+//! Logs of robots that this project's simulator did not drive ([`plain_robot`]): nothing is wrong with
 //! the robot, and nothing is found; what is wrong is named.
 //!
 //! Kinds of ordinary logs: coarse encoders, slow rows, stamps that jitter, sparse truth, one run or many. The
@@ -11,8 +11,9 @@ use diagnose::{Document, Finding, Options, diagnose};
 use rayon::prelude::*;
 use statrs::distribution::{Binomial, DiscreteCDF};
 
-use crate::ordinary_kinds::{Change, kinds, robots};
-use crate::plain_robot::{Event, PlainRobot, Records, Reports};
+use crate::ordinary_kinds::{kinds, robots};
+use plain_robot::Change;
+use plain_robot::{Event, PlainRobot, Records, Reports};
 
 fn diagnosed(robot: &PlainRobot) -> Result<Document, String> {
     diagnosed_in(robot.written().0.path())

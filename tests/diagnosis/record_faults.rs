@@ -9,8 +9,8 @@ use kinematics::Increment;
 
 use crate::hidden_effects::robot;
 use crate::motion_capture::simulated;
-use crate::plain_robot::PlainRobot;
 use crate::support::real_data::real_data;
+use plain_robot::PlainRobot;
 
 fn diagnosed(dataset: &Dataset) -> Document {
     let document = diagnose(std::slice::from_ref(dataset), &Options::default()).expect("a diagnosis").document;

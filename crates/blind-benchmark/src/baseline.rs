@@ -17,7 +17,7 @@ use statrs::distribution::{Binomial, DiscreteCDF};
 
 use super::case_kind::CaseKind;
 use super::error::ChallengeError;
-use super::measure::{is_first_name_right, is_plain};
+use super::measure::is_first_name_right;
 use super::result::CaseResult;
 
 /// Longest baseline, bytes.
@@ -100,7 +100,7 @@ const GUARDS: [(&str, &str, Fails); 5] = [
         counts.then_some(!case.failed_checks.is_empty())
     }),
     ("undetected", "effects of 1.6 limits and more that are not detected", |case| {
-        is_plain(case).then(|| case.findings().next().is_none())
+        case.is_plain().then(|| case.findings().next().is_none())
     }),
     ("wrong_first_name", "wrong names first, of detected effects without an alias", |case| {
         is_first_name_right(case).map(|is_right| !is_right)

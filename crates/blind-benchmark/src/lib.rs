@@ -132,6 +132,32 @@ pub fn challenge_datasets(scope: Scope, seed: u64, number: u64) -> Result<Vec<da
     Ok(Case::draw(scope, seed, number)?.map(of).unwrap_or_default())
 }
 
+/// A case's logs and what is true of them, for a tool that reads folders.
+#[derive(Debug)]
+pub struct CaseLogs {
+    /// The sessions that are diagnosed.
+    pub sessions: Vec<dataset::Dataset>,
+    /// A session of the same robot on other paths, at another speed, without errors of the instrument.
+    pub elsewhere: Vec<dataset::Dataset>,
+    /// Everything that is known of the case; nothing is said of it yet.
+    pub known: CaseResult,
+    /// The geometry that a calibration should find.
+    pub geometry: Option<kinematics::DriveGeometry>,
+}
+
+/// The logs of one case; `Err` with the id where no robot drawn for an effect shows it.
+///
+/// # Errors
+/// As [`challenge_case`].
+pub fn case_logs(scope: Scope, seed: u64, number: u64) -> Result<Result<CaseLogs, &'static str>, ChallengeError> {
+    let case = match Case::draw(scope, seed, number)? {
+        Ok(case) => case,
+        Err(id) => return Ok(Err(id)),
+    };
+    let (elsewhere, known, geometry) = (case.drive_elsewhere()?, score::undiagnosed(number, &case), case.truth());
+    Ok(Ok(CaseLogs { sessions: case.datasets, elsewhere, known, geometry }))
+}
+
 /// What came of a case.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -8,16 +8,13 @@ use super::hidden::EffectKind;
 use super::instrument::NoiseClass;
 use super::measure_value::{Measure, share};
 use super::oracle_view::OracleView;
-use super::power_ratio::{power, resolved_mean};
+use super::power_ratio::power;
 use super::result::{CaseResult, Planned, Reported};
 
 fn count<'a, T: 'a>(all: impl Iterator<Item = &'a T>, holds: impl Fn(&T) -> bool) -> (usize, usize) {
     all.fold((0, 0), |(k, n), one| (k + usize::from(holds(one)), n + 1))
 }
 
-/// A size with which a scatter or a gross fault must be named for itself: there is no oracle between their
-/// names.
-const CLEAR_RATIO: f64 = 2.0;
 /// A pair counts where the oracle finds each beside the other at this many detection limits.
 const PAIR_RATIO: f64 = 1.6;
 
@@ -44,13 +41,6 @@ fn identification_outcome(hidden: &OracleView, first: Option<&Reported>) -> Iden
         IdentificationOutcome::WrongName
     } else {
         IdentificationOutcome::WrongSet
-    }
-}
-
-fn is_aliased(hidden: &OracleView) -> bool {
-    match hidden.kind {
-        EffectKind::Mean | EffectKind::RecordFault => !hidden.aliases.is_empty(),
-        EffectKind::Scatter => !hidden.aliases.is_empty() || hidden.ratio.is_none_or(|ratio| ratio < CLEAR_RATIO),
     }
 }
 
@@ -188,23 +178,15 @@ fn one_log(cases: &[CaseResult]) -> Option<Measure> {
     })
 }
 
-/// A single effect counts as plain at this many detection limits, the bar on the power's ratio.
-const PLAIN_RATIO: f64 = 1.6;
-
-/// Whether a case hides a single mean that the encoder resolves and that must be detected.
-pub(crate) fn is_plain(case: &CaseResult) -> bool {
-    resolved_mean(case).is_some_and(|ratio| ratio >= PLAIN_RATIO)
-}
-
 fn detected(cases: &[CaseResult]) -> Measure {
     let hit = |case: &CaseResult| case.findings().next().is_some();
-    let plain = cases.iter().filter(|case| is_plain(case));
+    let plain = cases.iter().filter(|case| case.is_plain());
     share("detected", "effects of 1.6 limits and more that are detected", count(plain, hit), 0.9, false)
 }
 
 /// Whether the right name is first, of a detected single effect without an alias.
 pub(crate) fn is_first_name_right(case: &CaseResult) -> Option<bool> {
-    let hidden = case.hidden.first().filter(|hidden| case.case_kind == CaseKind::Single && !is_aliased(hidden))?;
+    let hidden = case.hidden.first().filter(|hidden| case.case_kind == CaseKind::Single && !hidden.is_aliased())?;
     match identification_outcome(hidden, case.findings().next()) {
         IdentificationOutcome::Undetected => None,
         outcome => Some(outcome == IdentificationOutcome::First),
@@ -238,8 +220,8 @@ fn names(cases: &[CaseResult]) -> Vec<Measure> {
         })
         .filter(|(_, identification_outcome, _)| *identification_outcome != IdentificationOutcome::Undetected)
         .collect();
-    let plain = singles.iter().filter(|(hidden, _, _)| !is_aliased(hidden));
-    let aliased = || singles.iter().filter(|(hidden, _, _)| is_aliased(hidden));
+    let plain = singles.iter().filter(|(hidden, _, _)| !hidden.is_aliased());
+    let aliased = || singles.iter().filter(|(hidden, _, _)| hidden.is_aliased());
     let mut measures = vec![
         share(
             "first_name",

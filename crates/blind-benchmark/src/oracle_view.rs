@@ -35,10 +35,23 @@ pub struct OracleView {
     pub rounding_share: Option<f64>,
 }
 
+/// A size with which a scatter or a gross fault must be named for itself: there is no oracle between their
+/// names.
+const CLEAR_RATIO: f64 = 2.0;
+
 /// An encoder that takes so much of an effect's noncentrality does not resolve it.
 const UNRESOLVED_SHARE: f64 = 0.9;
 
 impl OracleView {
+    /// Whether other names are right of it as well, or nobody can say that they are not.
+    #[must_use]
+    pub fn is_aliased(&self) -> bool {
+        match self.kind {
+            EffectKind::Mean | EffectKind::RecordFault => !self.aliases.is_empty(),
+            EffectKind::Scatter => !self.aliases.is_empty() || self.ratio.is_none_or(|ratio| ratio < CLEAR_RATIO),
+        }
+    }
+
     /// Whether the encoder resolves the effect.
     pub(crate) fn is_resolved(&self) -> bool {
         self.rounding_share.is_none_or(|share| share < UNRESOLVED_SHARE)

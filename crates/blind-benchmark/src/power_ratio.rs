@@ -1,18 +1,10 @@
 //! How large an effect must be to be detected, in units of the oracle's detection limit: where the best
 //! monotone curve of detection over size crosses 90 %, with a bootstrap over cases.
 
-use super::case_kind::CaseKind;
 use super::draw::Draw;
-use super::hidden::EffectKind;
 use super::instrument::NoiseClass;
 use super::measure_value::Measure;
 use super::result::CaseResult;
-
-/// The ratio of a single mean that the encoder resolves.
-pub(crate) fn resolved_mean(case: &CaseResult) -> Option<f64> {
-    let hidden = case.hidden.first().filter(|_| case.case_kind == CaseKind::Single)?;
-    hidden.ratio.filter(|_| hidden.kind == EffectKind::Mean && hidden.is_resolved())
-}
 
 /// Draws of the cases again, with replacement, for the limit of the power's ratio.
 const BOOTSTRAPS: usize = 400;
@@ -22,7 +14,7 @@ const BOOTSTRAPS: usize = 400;
 pub(crate) fn power(seed: u64, cases: &[CaseResult]) -> Measure {
     let hit = |case: &CaseResult| f64::from(u8::from(case.findings().next().is_some()));
     let white = cases.iter().filter(|case| case.noise == NoiseClass::White);
-    let mut points: Vec<(f64, f64)> = white.filter_map(|case| Some((resolved_mean(case)?, hit(case)))).collect();
+    let mut points: Vec<(f64, f64)> = white.filter_map(|case| Some((case.resolved_mean()?, hit(case)))).collect();
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
     let value = crossing(&points, 0.9);
     let mut draw = Draw::of(seed, u64::MAX, "bootstrap", 0);

@@ -75,9 +75,13 @@ pub struct CaseResult {
     pub planned: Option<Planned>,
 }
 
+/// A single effect counts as plain at this many detection limits, the bar on the power's ratio.
+const PLAIN_RATIO: f64 = 1.6;
+
 impl CaseResult {
     /// Findings that are right in the case's conditions.
-    fn right_findings(&self) -> Vec<&'static str> {
+    #[must_use]
+    pub fn right_findings(&self) -> Vec<&'static str> {
         self.strata.ordinary_conditions(self.noise).flat_map(OrdinaryCondition::right_findings).collect()
     }
 
@@ -103,8 +107,21 @@ impl CaseResult {
             .filter(move |reported| !reported.names.iter().any(|name| right.contains(&name.as_str()) && !hidden(name)))
     }
 
+    /// The ratio of a single mean that the encoder resolves.
+    pub(crate) fn resolved_mean(&self) -> Option<f64> {
+        let hidden = self.hidden.first().filter(|_| self.case_kind == CaseKind::Single)?;
+        hidden.ratio.filter(|_| hidden.kind == EffectKind::Mean && hidden.is_resolved())
+    }
+
+    /// Whether the case hides a single mean that the encoder resolves and that must be detected.
+    #[must_use]
+    pub fn is_plain(&self) -> bool {
+        self.resolved_mean().is_some_and(|ratio| ratio >= PLAIN_RATIO)
+    }
+
     /// Every stratum with the case's level, by the words of JSON; paths, truth and noise among them.
-    pub(crate) fn levels(&self) -> Vec<(String, String)> {
+    #[must_use]
+    pub fn levels(&self) -> Vec<(String, String)> {
         let mut levels: Vec<(String, String)> = Vec::new();
         if let Ok(serde_json::Value::Object(strata)) = serde_json::to_value(self.strata) {
             levels

@@ -23,36 +23,7 @@ pub(crate) fn score(number: u64, case: &Case, scope: Scope) -> Result<CaseResult
         _ => Vec::new(),
     };
     let diagnosed = diagnose(&case.datasets, &Options { without, limits: None, ..Options::default() });
-    let counts = [
-        case.datasets.len(),
-        case.datasets.iter().map(|dataset| dataset.runs.len()).sum(),
-        case.datasets
-            .iter()
-            .flat_map(|dataset| &dataset.runs)
-            .map(|run| run.truth.len() + run.displacements.len())
-            .sum(),
-    ];
-    let (strata, drawn) = strata(case);
-    let mut result = CaseResult {
-        case: number,
-        case_kind: case.case_kind,
-        paths: case.robot.family,
-        truth: case.instrument_model.kind,
-        noise: case.instrument_model.class,
-        strata,
-        drawn,
-        unresolved_robots: case.unresolved_robots,
-        counts,
-        hidden: case.oracle.clone(),
-        reported: Vec::new(),
-        reported_of_cut: None,
-        failed_checks: Vec::new(),
-        refused: None,
-        extended: false,
-        gain: None,
-        other_session: None,
-        planned: None,
-    };
+    let mut result = undiagnosed(number, case);
     if scope == Scope::OneLog {
         let of_cut = diagnose(&case.cut(), &Options { limits: None, ..Options::default() });
         let of_cut = of_cut.map_or_else(|_| Vec::new(), |diagnosis| reported(&diagnosis.document, case));
@@ -80,6 +51,40 @@ pub(crate) fn score(number: u64, case: &Case, scope: Scope) -> Result<CaseResult
         }
     }
     Ok(result)
+}
+
+/// What is true of a case, before anything is said of it.
+pub(crate) fn undiagnosed(number: u64, case: &Case) -> CaseResult {
+    let counts = [
+        case.datasets.len(),
+        case.datasets.iter().map(|dataset| dataset.runs.len()).sum(),
+        case.datasets
+            .iter()
+            .flat_map(|dataset| &dataset.runs)
+            .map(|run| run.truth.len() + run.displacements.len())
+            .sum(),
+    ];
+    let (strata, drawn) = strata(case);
+    CaseResult {
+        case: number,
+        case_kind: case.case_kind,
+        paths: case.robot.family,
+        truth: case.instrument_model.kind,
+        noise: case.instrument_model.class,
+        strata,
+        drawn,
+        unresolved_robots: case.unresolved_robots,
+        counts,
+        hidden: case.oracle.clone(),
+        reported: Vec::new(),
+        reported_of_cut: None,
+        failed_checks: Vec::new(),
+        refused: None,
+        extended: false,
+        gain: None,
+        other_session: None,
+        planned: None,
+    }
 }
 
 /// What the tool's model gains on the held-out log over its calibration without what it found, and what the

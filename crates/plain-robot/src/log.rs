@@ -3,9 +3,10 @@
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 
-use super::draws::Draws;
-use super::drive::{Path1kHz, Sample};
-use super::{Event, PlainRobot, Records, Reports, in_steps_of};
+use crate::draws::Draws;
+use crate::drive::{Path1kHz, Sample};
+use crate::robot::{Event, PlainRobot, Records, Reports};
+use crate::stamps::in_steps_of;
 
 impl PlainRobot {
     pub(super) fn of_run(&self, number: usize) -> impl Iterator<Item = Event> {

@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use super::draws::Draws;
-use super::{Event, PlainRobot};
+use crate::draws::Draws;
+use crate::robot::{Event, PlainRobot};
 
 /// A part of a drive: top speed and yaw rate, and how long it takes at these.
 #[derive(Debug, Clone, Copy)]

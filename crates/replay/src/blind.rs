@@ -1,0 +1,96 @@
+//! The blind benchmark's cases as logs with answers.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use blind_benchmark::{CaseKind, CaseLogs, EffectKind, OracleView, Scope, case_logs};
+use dataset::{Dataset, Existing};
+use kinematics::DriveGeometry;
+
+use crate::answer::{Answer, Cause, Question};
+use crate::corpus::ANSWER;
+
+/// A pair counts where each stands out beside the other at so many detection limits, as in the benchmark.
+const PLAIN_RATIO: f64 = 1.6;
+
+/// The folder of a case below a corpus.
+#[must_use]
+pub fn name(seed: u64, number: u64) -> String {
+    format!("blind/{seed}/{number:05}")
+}
+
+/// Writes one case of a seed into a folder of its own below `corpus`, unless it stands there; nothing where
+/// no robot drawn for an effect shows it.
+///
+/// # Errors
+/// A sentence where a case cannot be simulated or written.
+pub fn write(corpus: &Path, seed: u64, number: u64) -> Result<(), String> {
+    let folder = corpus.join(name(seed, number));
+    if folder.join(ANSWER).exists() {
+        return Ok(());
+    }
+    let Ok(logs) = case_logs(Scope::Whole, seed, number).map_err(|error| error.to_string())? else { return Ok(()) };
+    write_log(&folder, &answer(&logs, seed), &logs.sessions, &logs.elsewhere)
+}
+
+/// Writes a log; its answer last, so that a folder with an answer is whole.
+fn write_log(folder: &Path, answer: &Answer, training: &[Dataset], other: &[Dataset]) -> Result<(), String> {
+    for (part, sessions) in [("training", training), ("other", other)] {
+        for (number, session) in sessions.iter().enumerate() {
+            let dir = folder.join(part).join(format!("session_{number}"));
+            fs::create_dir_all(folder.join(part)).map_err(|error| format!("{}: {error}", folder.display()))?;
+            dataset::write(session, &dir, Existing::ReplaceDataset).map_err(|error| error.to_string())?;
+        }
+    }
+    let text = serde_json::to_vec_pretty(answer).map_err(|error| error.to_string())?;
+    let file = folder.join(ANSWER);
+    atomic_file::write_whole(&file, &text).map_err(|error| format!("{}: {error}", file.display()))
+}
+
+fn answer(logs: &CaseLogs, seed: u64) -> Answer {
+    let known = &logs.known;
+    let question = match known.case_kind {
+        CaseKind::Null => Question::Null,
+        CaseKind::Single | CaseKind::Large | CaseKind::OneLog => Question::One,
+        CaseKind::Pair => Question::Two,
+        CaseKind::LeftOut => Question::LeftOut,
+    };
+    let cause = |hidden: &OracleView| Cause {
+        right: vec![hidden.id.clone()],
+        aliases: hidden.aliases.clone(),
+        is_aliased: hidden.is_aliased(),
+        is_plain: match question {
+            Question::Two => hidden.ratio.is_some_and(|ratio| ratio >= PLAIN_RATIO),
+            _ => known.is_plain(),
+        },
+        sizes: if hidden.kind == EffectKind::Mean && !hidden.other_form {
+            hidden.values.iter().cloned().collect()
+        } else {
+            BTreeMap::new()
+        },
+    };
+    Answer {
+        corpus: "blind".to_owned(),
+        question,
+        causes: known.hidden.iter().map(cause).collect(),
+        exempt: known.right_findings().into_iter().map(str::to_owned).collect(),
+        without: match question {
+            Question::LeftOut => known.hidden.iter().map(|hidden| hidden.id.clone()).collect(),
+            _ => Vec::new(),
+        },
+        geometry_m: logs.geometry.map_or_else(BTreeMap::new, geometry_m),
+        seed,
+        strata: known.levels().into_iter().collect(),
+    }
+}
+
+/// A geometry's lengths by the names of a calibration's JSON.
+fn geometry_m(geometry: DriveGeometry) -> BTreeMap<String, f64> {
+    let diameter_m = geometry.wheel_diameter_m();
+    BTreeMap::from([
+        ("left_wheel_diameter_m".to_owned(), diameter_m.left),
+        ("right_wheel_diameter_m".to_owned(), diameter_m.right),
+        ("wheel_separation_m".to_owned(), geometry.wheel_separation_m()),
+    ])
+}

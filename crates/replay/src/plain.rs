@@ -1,0 +1,82 @@
+//! Logs of [`plain_robot`] with their answers: kinds of ordinary logs, and mixed ones.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use plain_robot::{Kind, Mixed, PlainRobot};
+
+use crate::answer::{Answer, Cause, Question};
+use crate::corpus::ANSWER;
+
+/// The folder of a robot of a kind below a corpus.
+#[must_use]
+pub fn kind_name((name, ..): Kind, seed: u64) -> String {
+    let words: String = name.chars().map(|letter| if letter.is_ascii_alphanumeric() { letter } else { '-' }).collect();
+    format!("ordinary/{words}-{seed}")
+}
+
+/// The folder of a mixed log below a corpus.
+#[must_use]
+pub fn mixed_name(seed: u64) -> String {
+    format!("mixed/{seed}")
+}
+
+/// Writes the log of a robot of a kind into a folder of its own below `corpus`, unless it stands there;
+/// `group` is the seed of the campaign.
+///
+/// # Errors
+/// A sentence with the answer that cannot be written.
+pub fn write_kind(corpus: &Path, kind: Kind, seed: u64, group: u64) -> Result<(), String> {
+    let (name, change, exempt) = kind;
+    let mut robot = PlainRobot::ordinary(seed);
+    change(&mut robot);
+    let strata = BTreeMap::from([("kind".to_owned(), name.to_owned())]);
+    let answer =
+        Answer { exempt: exempt.iter().map(|id| (*id).to_owned()).collect(), strata, ..null("ordinary", group) };
+    write(&corpus.join(kind_name(kind, seed)), &robot, answer)
+}
+
+/// Writes the mixed log of a seed, likewise.
+///
+/// # Errors
+/// As [`write_kind`].
+pub fn write_mixed(corpus: &Path, seed: u64, group: u64) -> Result<(), String> {
+    let Mixed { robot, exempt, fault, .. } = Mixed::drawn(seed);
+    // How large a fault must be to be seen nobody has computed: none is plain.
+    let cause = |fault: &str| Cause { right: vec![fault.to_owned()], ..Cause::default() };
+    let answer = Answer {
+        question: if fault.is_some() { Question::One } else { Question::Null },
+        causes: fault.map(cause).into_iter().collect(),
+        exempt: exempt.into_iter().map(str::to_owned).collect(),
+        ..null("mixed", group)
+    };
+    write(&corpus.join(mixed_name(seed)), &robot, answer)
+}
+
+fn null(corpus: &str, seed: u64) -> Answer {
+    Answer {
+        corpus: corpus.to_owned(),
+        question: Question::Null,
+        causes: Vec::new(),
+        exempt: Vec::new(),
+        without: Vec::new(),
+        geometry_m: BTreeMap::new(),
+        seed,
+        strata: BTreeMap::new(),
+    }
+}
+
+fn write(folder: &Path, robot: &PlainRobot, answer: Answer) -> Result<(), String> {
+    let file = folder.join(ANSWER);
+    if file.exists() {
+        return Ok(());
+    }
+    let [left, right, separation] = robot.write(&folder.join("training/session_0"));
+    let geometry_m =
+        [("left_wheel_diameter_m", left), ("right_wheel_diameter_m", right), ("wheel_separation_m", separation)];
+    let geometry_m = geometry_m.map(|(name, length_m)| (name.to_owned(), length_m)).into();
+    let text = serde_json::to_vec_pretty(&Answer { geometry_m, ..answer }).map_err(|error| error.to_string())?;
+    fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    atomic_file::write_whole(&file, &text).map_err(|error| format!("{}: {error}", file.display()))
+}
