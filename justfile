@@ -48,6 +48,22 @@ documents:
 challenge:
     .ci/run challenge
 
+# Sixty logs against what the last accepted build says of them
+compared:
+    .ci/run compared
+
+# The same logs through two builds, in paired tables: just replay OLD NEW, two revisions or executables; docs/replay.md
+replay OLD NEW *WORDS:
+    .ci/run replay {{OLD}} {{NEW}} {{WORDS}}
+
+# Store what this build says of the sixty logs of `compared`
+replay-baseline:
+    .ci/run replay-baseline
+
+# A robot of rigid bodies: drive 300 logs in MuJoCo, diagnose them and score what is said; docs/physics-judge.md
+physics:
+    .ci/run physics
+
 # What draws its seed from the clock: 140 cases of the blind benchmark that nobody has seen. It prints the seed
 fresh-seeds:
     .ci/run fresh-seeds

@@ -15,6 +15,7 @@ mod files;
 mod packages;
 mod python;
 mod settings;
+mod size;
 #[path = "../support/mod.rs"]
 mod support;
 mod words;

@@ -39,7 +39,7 @@ pub(crate) struct Arguments {
     /// Print JSON in place of tables.
     #[arg(long)]
     pub(crate) json: bool,
-    /// Exit with 1 where more is lost than the rule of acceptance allows.
+    /// Exit with 1 where more is lost than the rule of acceptance allows, with p below 0.05.
     #[arg(long)]
     pub(crate) check: bool,
 }

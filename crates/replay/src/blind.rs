@@ -35,8 +35,8 @@ pub fn write(corpus: &Path, seed: u64, number: u64) -> Result<(), String> {
 }
 
 /// Writes a log; its answer last, so that a folder with an answer is whole.
-fn write_log(folder: &Path, answer: &Answer, training: &[Dataset], other: &[Dataset]) -> Result<(), String> {
-    for (part, sessions) in [("training", training), ("other", other)] {
+fn write_log(folder: &Path, answer: &Answer, training: &[Dataset], held_out: &[Dataset]) -> Result<(), String> {
+    for (part, sessions) in [("training", training), ("held_out", held_out)] {
         for (number, session) in sessions.iter().enumerate() {
             let dir = folder.join(part).join(format!("session_{number}"));
             fs::create_dir_all(folder.join(part)).map_err(|error| format!("{}: {error}", folder.display()))?;

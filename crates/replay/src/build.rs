@@ -100,7 +100,7 @@ impl Build {
             Err(error) => return Ok(Outcome::refusal(&log.digest, format!("its JSON: {error}"), seconds)),
         };
         let mut evaluations = Vec::new();
-        for session in log.other() {
+        for session in log.held_out() {
             let mut evaluate = Command::new(&self.executable);
             evaluate.arg("evaluate").arg(session).arg("--json").arg("--quiet");
             for model in ["calibration.toml", "extended.toml"] {

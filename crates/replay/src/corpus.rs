@@ -1,5 +1,5 @@
-//! Logs with their answers in folders: `NAME/answer.json`, `NAME/training/SESSION` in the project's format
-//! and, where the robot drove elsewhere, `NAME/other/SESSION`.
+//! Logs with their answers in folders: `NAME/answer.json`, `NAME/training` in the project's format and, where
+//! the robot drove elsewhere, `NAME/held_out`; each a dataset, or a folder of datasets.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -59,12 +59,15 @@ impl Log {
 
     /// The sessions that are driven elsewhere; none where there are none.
     #[must_use]
-    pub fn other(&self) -> Vec<PathBuf> {
-        folders(&self.folder.join("other"))
+    pub fn held_out(&self) -> Vec<PathBuf> {
+        folders(&self.folder.join("held_out"))
     }
 }
 
 fn folders(parent: &Path) -> Vec<PathBuf> {
+    if parent.join("dataset.toml").exists() {
+        return vec![parent.to_owned()];
+    }
     let entries = fs::read_dir(parent).into_iter().flatten().filter_map(Result::ok);
     let mut folders: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(|path| path.is_dir()).collect();
     folders.sort();

@@ -46,8 +46,8 @@ pub enum Verdict {
 /// Draws of random signs and of the bootstrap: a p-value of 0.01 is known to a tenth.
 const DRAWS: usize = 10_000;
 
-/// A difference counts as won below this.
-const LEVEL: f64 = 0.05;
+/// A difference counts as won, and a loss as more than chance, below this.
+pub(crate) const LEVEL: f64 = 0.05;
 
 /// Two-sided 95 % of a normal variable.
 const QUANTILE: f64 = 1.96;

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::corpus::Log;
 use crate::measure::{MEASURES, Measure};
 use crate::outcome::Outcome;
-use crate::paired::{Paired, Verdict};
+use crate::paired::{LEVEL, Paired, Verdict};
 
 /// Outcomes of one build in a file, by the names of the logs.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -102,10 +102,10 @@ impl Comparison {
         Self { all, levels, spread, differing: differing.collect() }
     }
 
-    /// The measures of which more is lost than the rule of acceptance allows.
+    /// The measures of which more is lost than the rule of acceptance allows, and than chance explains.
     #[must_use]
     pub fn lost(&self) -> Vec<&Paired> {
-        self.all.iter().filter(|paired| paired.verdict == Some(Verdict::Lost)).collect()
+        self.all.iter().filter(|paired| paired.verdict == Some(Verdict::Lost) && paired.p_value < LEVEL).collect()
     }
 
     /// The table of all logs, the levels that differ, and the seeds.
