@@ -109,7 +109,7 @@ pub const MEASURES: [Measure; 13] = [
     share("refused", "refused", false, None, |_, outcome| Some(outcome.refused.is_some())),
     Measure {
         id: "rms_z",
-        what: "nulls: RMS z of the lengths",
+        what: "nulls: RMS z of the geometry",
         score: Score::RootMean(|answer, outcome| {
             let z: Vec<f64> = answer.geometry_m.iter().filter_map(|(name, truth)| z(*truth, outcome, name)).collect();
             let mean = z.iter().map(|z| z * z).sum::<f64>() / z.len() as f64;

@@ -11,6 +11,12 @@ use crate::measure::{MEASURES, Measure};
 use crate::outcome::Outcome;
 use crate::paired::{LEVEL, Paired, Verdict};
 
+/// Levels whose difference chance explains more easily are not shown.
+const SHOWN_LEVEL: f64 = 0.2;
+
+/// A seed of fewer logs is no campaign of its own.
+const MIN_LOGS: usize = 30;
+
 /// Outcomes of one build in a file, by the names of the logs.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Stored {
@@ -78,7 +84,9 @@ impl Comparison {
                 paired.into_iter().map(move |paired| Level { stratum: stratum.clone(), level: level.clone(), paired })
             })
             .collect();
-        let seeds: BTreeSet<u64> = logs.iter().map(|log| log.answer.seed).filter(|seed| *seed != 0).collect();
+        let count = |seed: u64| logs.iter().filter(|log| log.answer.seed == seed).count();
+        let seeds: BTreeSet<u64> = logs.iter().map(|log| log.answer.seed).collect();
+        let seeds: Vec<u64> = seeds.into_iter().filter(|seed| count(*seed) >= MIN_LOGS).collect();
         let spread = all.iter().filter_map(|paired| {
             let measure = MEASURES.iter().find(|measure| measure.id == paired.measure)?;
             let of_seed = |seed: &u64| {
@@ -118,7 +126,8 @@ impl Comparison {
         }
         let mut levels =
             table(&["level", "measure", "logs", "old", "new", "only old", "only new", "difference, 95 %", "p"]);
-        let differs = |level: &&Level| is_share(&level.paired) && level.paired.discordant != [0, 0];
+        // Of hundreds of levels those that chance alone would show once in five.
+        let differs = |level: &&Level| is_share(&level.paired) && level.paired.p_value < SHOWN_LEVEL;
         for level in self.levels.iter().filter(differs) {
             let mut cells = row(&level.paired);
             cells.pop();
@@ -133,7 +142,7 @@ impl Comparison {
             seeds.add_row(cells.into_iter().chain([shown(spread.measure, spread.visible)]));
         }
         format!(
-            "{all}\n\nlevels in which shares differ:\n{levels}\n\nby seed, and the difference that these logs show:\n{seeds}\n"
+            "{all}\n\nlevels in which shares differ with p below {SHOWN_LEVEL} (--json has all):\n{levels}\n\nby seed, and the difference that these logs show:\n{seeds}\n"
         )
     }
 }
