@@ -103,16 +103,17 @@ impl Strays {
     fn constant(&mut self, name: &str, of: &Type, value: &Expr) {
         let mut parts = Parts::default();
         parts.visit_expr(value);
-        if is_numeric(of) && parts.has_number && !parts.has_constant {
+        if is_one_of(&NUMERIC, of) && parts.has_number && !parts.has_constant {
             self.0.push(name.to_owned());
         }
     }
 }
 
-fn is_numeric(of: &Type) -> bool {
+/// Whether a type is one of these, or an array of one.
+pub(crate) fn is_one_of(names: &[&str], of: &Type) -> bool {
     match of {
-        Type::Array(array) => is_numeric(&array.elem),
-        Type::Path(path) => path.path.segments.last().is_some_and(|last| NUMERIC.iter().any(|name| last.ident == name)),
+        Type::Array(array) => is_one_of(names, &array.elem),
+        Type::Path(path) => path.path.segments.last().is_some_and(|last| names.iter().any(|name| last.ident == name)),
         _ => false,
     }
 }

@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use syn::visit::{self, Visit};
-use syn::{BinOp, Expr, ExprBinary, ExprLit, Item, Lit, Type};
+use syn::{BinOp, Expr, ExprBinary, ExprLit, Item, Lit};
 
+use crate::settings::is_one_of;
 use crate::{files, root, text};
 
 /// Crates whose code decides about a log.
@@ -48,14 +49,6 @@ struct Found {
     literals: usize,
 }
 
-fn is_numeric(of: &Type) -> bool {
-    match of {
-        Type::Array(array) => is_numeric(&array.elem),
-        Type::Path(path) => path.path.segments.last().is_some_and(|last| NUMERIC.iter().any(|name| last.ident == name)),
-        _ => false,
-    }
-}
-
 fn is_counted_number(of: &Expr) -> bool {
     match of {
         Expr::Unary(of) => is_counted_number(&of.expr),
@@ -70,7 +63,7 @@ fn is_counted_number(of: &Expr) -> bool {
 impl<'ast> Visit<'ast> for Found {
     fn visit_item(&mut self, item: &'ast Item) {
         if let Item::Const(constant) = item {
-            self.constants += usize::from(is_numeric(&constant.ty));
+            self.constants += usize::from(is_one_of(&NUMERIC, &constant.ty));
         }
         visit::visit_item(self, item);
     }

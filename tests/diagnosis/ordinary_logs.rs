@@ -12,8 +12,7 @@ use rayon::prelude::*;
 use statrs::distribution::{Binomial, DiscreteCDF};
 
 use crate::ordinary_kinds::{asked, kinds, robots};
-use plain_robot::Change;
-use plain_robot::{Event, PlainRobot, Records, Reports};
+use plain_robot::{Change, Event, PlainRobot, Records, Reports};
 
 fn diagnosed(robot: &PlainRobot) -> Result<Document, String> {
     diagnosed_in(robot.written().0.path())

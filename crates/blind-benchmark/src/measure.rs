@@ -15,9 +15,6 @@ fn count<'a, T: 'a>(all: impl Iterator<Item = &'a T>, holds: impl Fn(&T) -> bool
     all.fold((0, 0), |(k, n), one| (k + usize::from(holds(one)), n + 1))
 }
 
-/// A pair counts where the oracle finds each beside the other at this many detection limits.
-const PAIR_RATIO: f64 = 1.6;
-
 /// What was said of one hidden effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum IdentificationOutcome {
@@ -382,8 +379,7 @@ pub(crate) fn without(hidden: &OracleView, case: &CaseResult) -> Without {
 }
 
 fn pairs(cases: &[CaseResult]) -> Measure {
-    let both_show =
-        |case: &&CaseResult| case.hidden.iter().all(|hidden| hidden.ratio.is_some_and(|ratio| ratio >= PAIR_RATIO));
+    let both_show = |case: &&CaseResult| case.hidden.iter().all(OracleView::is_plain);
     let both = |case: &CaseResult| {
         case.hidden.iter().all(|hidden| case.findings().any(|reported| reported.names.contains(&hidden.id)))
     };

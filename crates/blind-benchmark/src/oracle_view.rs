@@ -39,6 +39,9 @@ pub struct OracleView {
 /// names.
 const CLEAR_RATIO: f64 = 2.0;
 
+/// An effect counts as plain at this many detection limits, the bar on the power's ratio.
+const PLAIN_RATIO: f64 = 1.6;
+
 /// An encoder that takes so much of an effect's noncentrality does not resolve it.
 const UNRESOLVED_SHARE: f64 = 0.9;
 
@@ -50,6 +53,12 @@ impl OracleView {
             EffectKind::Mean | EffectKind::RecordFault => !self.aliases.is_empty(),
             EffectKind::Scatter => !self.aliases.is_empty() || self.ratio.is_none_or(|ratio| ratio < CLEAR_RATIO),
         }
+    }
+
+    /// Whether the effect is large enough that it must be detected, beside another hidden effect too.
+    #[must_use]
+    pub fn is_plain(&self) -> bool {
+        self.ratio.is_some_and(|ratio| ratio >= PLAIN_RATIO)
     }
 
     /// Whether the encoder resolves the effect.

@@ -75,9 +75,6 @@ pub struct CaseResult {
     pub planned: Option<Planned>,
 }
 
-/// A single effect counts as plain at this many detection limits, the bar on the power's ratio.
-const PLAIN_RATIO: f64 = 1.6;
-
 impl CaseResult {
     /// Findings that are right in the case's conditions.
     #[must_use]
@@ -116,7 +113,7 @@ impl CaseResult {
     /// Whether the case hides a single mean that the encoder resolves and that must be detected.
     #[must_use]
     pub fn is_plain(&self) -> bool {
-        self.resolved_mean().is_some_and(|ratio| ratio >= PLAIN_RATIO)
+        self.resolved_mean().is_some() && self.hidden[0].is_plain()
     }
 
     /// Every stratum with the case's level, by the words of JSON; paths, truth and noise among them.

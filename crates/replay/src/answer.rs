@@ -77,3 +77,9 @@ impl Answer {
         names.iter().any(|name| self.exempt.contains(name) && !is_cause(name))
     }
 }
+
+/// Both wheels' diameters and their separation, metres, by the names that a calibration has in JSON.
+pub(crate) fn geometry_m(sizes_m: [f64; 3]) -> BTreeMap<String, f64> {
+    let names = ["left_wheel_diameter_m", "right_wheel_diameter_m", "wheel_separation_m"];
+    names.into_iter().map(str::to_owned).zip(sizes_m).collect()
+}

@@ -8,11 +8,8 @@ use blind_benchmark::{CaseKind, CaseLogs, EffectKind, OracleView, Scope, case_lo
 use dataset::{Dataset, Existing};
 use kinematics::DriveGeometry;
 
-use crate::answer::{Answer, Cause, Question};
+use crate::answer::{Answer, Cause, Question, geometry_m};
 use crate::corpus::ANSWER;
-
-/// A pair counts where each stands out beside the other at so many detection limits, as in the benchmark.
-const PLAIN_RATIO: f64 = 1.6;
 
 /// The folder of a case below a corpus.
 #[must_use]
@@ -61,7 +58,7 @@ fn answer(logs: &CaseLogs, seed: u64) -> Answer {
         aliases: hidden.aliases.clone(),
         is_aliased: hidden.is_aliased(),
         is_plain: match question {
-            Question::Two => hidden.ratio.is_some_and(|ratio| ratio >= PLAIN_RATIO),
+            Question::Two => hidden.is_plain(),
             _ => known.is_plain(),
         },
         sizes: if hidden.kind == EffectKind::Mean && !hidden.other_form {
@@ -79,18 +76,13 @@ fn answer(logs: &CaseLogs, seed: u64) -> Answer {
             Question::LeftOut => known.hidden.iter().map(|hidden| hidden.id.clone()).collect(),
             _ => Vec::new(),
         },
-        geometry_m: logs.geometry.map_or_else(BTreeMap::new, geometry_m),
+        geometry_m: logs.geometry.map(|geometry| geometry_m(lengths_of(geometry))).unwrap_or_default(),
         seed,
         strata: known.levels().into_iter().collect(),
     }
 }
 
-/// A geometry's lengths by the names of a calibration's JSON.
-fn geometry_m(geometry: DriveGeometry) -> BTreeMap<String, f64> {
+fn lengths_of(geometry: DriveGeometry) -> [f64; 3] {
     let diameter_m = geometry.wheel_diameter_m();
-    BTreeMap::from([
-        ("left_wheel_diameter_m".to_owned(), diameter_m.left),
-        ("right_wheel_diameter_m".to_owned(), diameter_m.right),
-        ("wheel_separation_m".to_owned(), geometry.wheel_separation_m()),
-    ])
+    [diameter_m.left, diameter_m.right, geometry.wheel_separation_m()]
 }

@@ -62,7 +62,7 @@ const HARM: (f64, f64) = (0.1, 0.01);
 /// Two-sided 95 % of a normal variable.
 const COVERED: f64 = 1.96;
 
-/// The least drift of which a logarithm is taken, per cent: a micrometre in ten centimetres.
+/// Smallest drift whose logarithm is taken, per cent of the distance.
 const MIN_DRIFT: f64 = 1e-3;
 
 /// Every measure, in the order of the tables. Margins are those of the rule of acceptance (CONTRIBUTING.md).

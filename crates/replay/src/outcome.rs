@@ -105,7 +105,7 @@ impl Outcome {
         Ok(Self { log: log.to_owned(), refused: None, findings, lengths, drift_percent: None, seconds })
     }
 
-    /// The outcome of a log of which a build gives no diagnosis.
+    /// The outcome of a log that a build does not diagnose.
     #[must_use]
     pub fn refusal(log: &str, why: String, seconds: f64) -> Self {
         let (findings, lengths) = (Vec::new(), BTreeMap::new());

@@ -7,7 +7,7 @@ use statrs::distribution::{Binomial, DiscreteCDF};
 
 use crate::measure::Measure;
 
-/// A measure of two builds on the logs of which both have a score.
+/// One measure of two builds, on the logs that both scored.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Paired {
     /// The measure's key.

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use plain_robot::{Kind, Mixed, PlainRobot};
 
-use crate::answer::{Answer, Cause, Question};
+use crate::answer::{Answer, Cause, Question, geometry_m};
 use crate::corpus::ANSWER;
 
 /// The folder of a robot of a kind below a corpus.
@@ -72,10 +72,7 @@ fn write(folder: &Path, robot: &PlainRobot, answer: Answer) -> Result<(), String
     if file.exists() {
         return Ok(());
     }
-    let [left, right, separation] = robot.write(&folder.join("training/session_0"));
-    let geometry_m =
-        [("left_wheel_diameter_m", left), ("right_wheel_diameter_m", right), ("wheel_separation_m", separation)];
-    let geometry_m = geometry_m.map(|(name, length_m)| (name.to_owned(), length_m)).into();
+    let geometry_m = geometry_m(robot.write(&folder.join("training/session_0")));
     let text = serde_json::to_vec_pretty(&Answer { geometry_m, ..answer }).map_err(|error| error.to_string())?;
     fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     atomic_file::write_whole(&file, &text).map_err(|error| format!("{}: {error}", file.display()))
