@@ -16,6 +16,10 @@ lint:
 test:
     .ci/run test
 
+# The whole job on a simulated robot
+demo:
+    .ci/run demo
+
 # The paper's experiments, Monte Carlo
 sweep:
     .ci/run sweep

@@ -87,7 +87,7 @@ pub(crate) fn find() -> Result<Found, Box<dyn Error>> {
             (Parameter::WheelSeparation, geometry.wheel_separation_m()),
         ];
         let values = values.map(|(parameter, value)| (parameter.key().to_owned(), value)).into();
-        let calibration = NamedCalibration { name: "mine".to_owned(), values };
+        let calibration = NamedCalibration::new("mine".to_owned(), values);
         let augmented = AugmentedCalibration { calibration, terms, term_values: model.term_values.clone() };
         let runs = evaluate_runs(&new.session(), Some(&augmented), &EvaluationOptions::default(), &mut 0.0);
         let missed_m: f64 = runs.iter().filter_map(|run| run.final_position_m).sum();

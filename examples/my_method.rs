@@ -93,7 +93,7 @@ impl Method for Tape {
             runs_used,
             // What a method cannot see it says.
             not_observable: [Parameter::LeftWheelDiameter, Parameter::RightWheelDiameter]
-                .map(|parameter| NotObservable { parameter, why: "both wheels are taken to be alike" })
+                .map(|parameter| NotObservable { parameter, why: "both wheels are taken to be alike".into() })
                 .to_vec(),
             ..Calibration::new(NAME, geometry, robot.ticks_per_rev)
         })

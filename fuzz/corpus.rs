@@ -45,6 +45,14 @@ pub(crate) fn datasets() -> Vec<Sample> {
     together("fuzz/corpus/dataset")
 }
 
+pub(crate) fn captures() -> Vec<Sample> {
+    together("fuzz/corpus/capture")
+}
+
+pub(crate) fn motions() -> Vec<Sample> {
+    together("fuzz/corpus/motions")
+}
+
 pub(crate) fn tables() -> Vec<Sample> {
     apart("fuzz/corpus/csv", ".csv")
 }
@@ -59,6 +67,10 @@ pub(crate) fn tuples() -> Vec<Sample> {
 
 pub(crate) fn optiodom() -> Vec<Sample> {
     together("fuzz/corpus/optiodom")
+}
+
+pub(crate) fn robot_files() -> Vec<Sample> {
+    apart("fuzz/corpus/robot", "")
 }
 
 pub(crate) fn calibrations() -> Vec<Sample> {
@@ -77,9 +89,12 @@ pub(crate) fn bags() -> Vec<Sample> {
     ["zstd.mcap", "two_topics.mcap"].map(|name| vec![named(&root().join("tests/ros2").join(name))]).into()
 }
 
-#[cfg(feature = "db3")]
 pub(crate) fn bags_in_sqlite() -> Vec<Sample> {
     apart("fuzz/corpus/db3", ".db3")
+}
+
+pub(crate) fn bags_of_ros1() -> Vec<Sample> {
+    apart("fuzz/corpus/ros1", ".bag")
 }
 
 pub(crate) fn metadata() -> Vec<Sample> {

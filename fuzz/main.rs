@@ -16,7 +16,7 @@
 mod bag;
 mod corpus;
 mod odd_datasets;
-#[cfg(feature = "db3")]
+mod ros1;
 mod sqlite;
 mod targets;
 mod text;

@@ -10,12 +10,13 @@ use yair::bench::{self, SweepResult};
 use yair::blind_benchmark::DiagnosisBaseline;
 use yair::calib::CalibrationReport;
 use yair::command::{Watch, call};
-use yair::dataset::import::csv::{Options as CsvOptions, RobotGiven};
+use yair::dataset::import::csv::{MotionOptions, Options as CsvOptions, RobotGiven};
 use yair::dataset::{Dataset, Existing, RunByRun};
 use yair::diagnose::ExtendedModel;
 use yair::export::format::EXPORTERS;
 use yair::export::{self, CalibratedRobot};
 use yair::kinematics::Wheels;
+use yair::robot_files::{Robot, put, put_in_urdf};
 use yair::scenario::Scenario;
 
 use crate::corpus::{self, Sample};
@@ -34,6 +35,8 @@ pub(crate) struct Target {
 pub(crate) const TARGETS: &[Target] = &[
     Target { name: "dataset", corpus: corpus::datasets, run: read_dataset, cost: 1 },
     Target { name: "csv", corpus: corpus::tables, run: read_table, cost: 1 },
+    Target { name: "motion-capture", corpus: corpus::captures, run: read_capture, cost: 1 },
+    Target { name: "motions", corpus: corpus::motions, run: read_motions, cost: 1 },
     Target { name: "tum", corpus: corpus::trajectories, run: read_trajectories, cost: 1 },
     Target {
         name: "optiodom",
@@ -43,9 +46,10 @@ pub(crate) const TARGETS: &[Target] = &[
     },
     Target { name: "censi", corpus: corpus::tuples, run: |all, random, at| import("censi", all, random, at), cost: 1 },
     Target { name: "mcap-and-cdr", corpus: corpus::bags, run: read_bag, cost: 2 },
-    #[cfg(feature = "db3")]
     Target { name: "db3", corpus: corpus::bags_in_sqlite, run: read_bag_in_sqlite, cost: 1 },
+    Target { name: "ros1", corpus: corpus::bags_of_ros1, run: read_bag_of_ros1, cost: 1 },
     Target { name: "bag-metadata", corpus: corpus::metadata, run: read_metadata, cost: 1 },
+    Target { name: "robot-files", corpus: corpus::robot_files, run: read_robot_file, cost: 1 },
     Target { name: "scenario", corpus: corpus::scenarios, run: read_scenario, cost: 1 },
     Target { name: "calibration", corpus: corpus::calibrations, run: read_calibration, cost: 1 },
     Target { name: "extended", corpus: corpus::extended, run: read_extended, cost: 1 },
@@ -135,6 +139,29 @@ fn read_table(all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Path) -> boo
     }
 }
 
+fn read_capture(all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Path) -> bool {
+    placed(all, random, at);
+    let files = ["wheels.csv", "take.csv"].map(|name| at.join(name));
+    match dataset::import::csv::read(&files, &CsvOptions { robot: robot(), ..CsvOptions::default() }) {
+        Err(error) => refused(&error),
+        Ok(found) => round_trip(&found.imported.dataset, at),
+    }
+}
+
+fn read_motions(all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Path) -> bool {
+    placed(all, random, at);
+    let options =
+        MotionOptions { robot: robot(), period_s: 1.0, length_unit: dataset::Unit::M, angle_unit: dataset::Unit::Rad };
+    match dataset::import::csv::read_motions(&at.join("odometry.txt"), &at.join("scans.txt"), &options) {
+        Err(error) => refused(&error),
+        Ok(found) => match dataset::check_writable(&found.imported.dataset) {
+            // Angles of wheels that add up to more than a double holds.
+            Err(error) => refused(&error),
+            Ok(()) => round_trip(&found.imported.dataset, at),
+        },
+    }
+}
+
 fn read_trajectories(all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Path) -> bool {
     placed(all, random, at);
     let [truth, wheels] = ["truth.txt", "wheels.txt"].map(|name| at.join(name).display().to_string());
@@ -167,9 +194,12 @@ fn import(format: &str, all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Pa
 }
 
 fn bag_in(at: &Path) -> bool {
+    bag_with(at, &ros_bag::Options { robot: robot(), ..Default::default() })
+}
+
+fn bag_with(at: &Path, options: &ros_bag::Options) -> bool {
     let listed = ros_bag::list(at, &[]);
-    let options = ros_bag::Options { robot: robot(), ..Default::default() };
-    match ros_bag::import(at, &options) {
+    match ros_bag::import(at, options) {
         Err(error) => refused(&error),
         Ok(found) => {
             listed.expect("what is imported can be listed");
@@ -186,12 +216,22 @@ fn read_bag(all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Path) -> bool 
     bag_in(&path)
 }
 
-#[cfg(feature = "db3")]
 fn read_bag_in_sqlite(all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Path) -> bool {
     let (_, bytes) = &pick(all, random)[0];
     let path = at.join("a.db3");
     fs::write(&path, crate::sqlite::mutated(bytes, random)).expect("written");
     bag_in(&path)
+}
+
+fn read_bag_of_ros1(all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Path) -> bool {
+    let (name, bytes) = &pick(all, random)[0];
+    let path = at.join("a.bag");
+    fs::write(&path, crate::ros1::mutated(bytes, random)).expect("written");
+    // Poses by a chain of transforms: of a marker on the base, or of a map that is corrected.
+    let parent = *pick(&["mocap", "map"], random);
+    let chain = name.starts_with("transforms").then(|| (parent.to_owned(), "base_link".to_owned()));
+    let truth = chain.is_some().then(|| "/tf".to_owned());
+    bag_with(&path, &ros_bag::Options { truth, truth_frames: chain, robot: robot(), ..Default::default() })
 }
 
 fn read_metadata(all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Path) -> bool {
@@ -227,6 +267,39 @@ fn numbers(value: &toml::Value) -> Vec<f64> {
         _ => Vec::new(),
     }
 }
+
+/// A robot's own file: what is read has lengths of a robot, and put back in it changes nothing that is said.
+fn read_robot_file(all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Path) -> bool {
+    let path = placed(all, random, at);
+    let Ok(text) = fs::read_to_string(&path) else { return false };
+    let file = path.display().to_string();
+    let robot = match Robot::read(&file, &text, None) {
+        Err(error) => return refused(&error),
+        Ok(robot) => robot,
+    };
+    let wheels_m = robot.wheel_diameter_m.iter().flat_map(|wheels_m| [wheels_m.left, wheels_m.right]);
+    assert!(wheels_m.chain(robot.wheel_separation_m).all(|length_m| length_m > 0.0 && length_m < 10.0), "{robot:?}");
+    for fragment in ROBOT_FRAGMENTS {
+        match put(&file, &text, fragment, None) {
+            Err(error) => assert!(!error.to_string().is_empty()),
+            Ok(edited) => {
+                let again = put(&file, &edited.text, fragment, None).expect("it has the places");
+                assert_eq!(again.text, edited.text);
+            }
+        }
+    }
+    if let Ok(edited) = put_in_urdf(&text, Wheels { left: 0.101, right: 0.102 }, 0.4) {
+        let back = Robot::read(&file, &edited.text, None).expect("a URDF");
+        assert!((back.wheel_separation_m.expect("joints") - 0.4).abs() < 1e-6, "{back:?}");
+    }
+    true
+}
+
+/// What is put into files: parameters of a controller, and defines.
+const ROBOT_FRAGMENTS: [&str; 2] = [
+    "a:\n  ros__parameters:\n    wheel_separation: 0.41\n    wheel_radius: 0.1\n    left_wheel_radius_multiplier: 1.01\n",
+    "#define WHEEL_DIAMETER 0.06\n#define LR_WHEELS_DISTANCE 0.2\n#define COUNTS_PER_REV1 990\n#define COUNTS_PER_REV2 991\n",
+];
 
 fn read_calibration(all: &[Sample], random: &mut Xoshiro256PlusPlus, at: &Path) -> bool {
     match CalibrationReport::read(&placed(all, random, at)) {

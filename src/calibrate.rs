@@ -21,11 +21,11 @@ use crate::log::blocks_at;
 use crate::simulate::write_whole;
 use crate::terminal::{Failure, Terminal, advance, cell, datasets_at, read_datasets, table};
 
-/// Calibrate one robot from its sessions.
+/// Calibrate a robot: wheel diameters and wheel separation from its sessions.
 #[derive(Args)]
 #[command(after_help = methods())]
 pub(crate) struct Arguments {
-    /// Datasets; several are one robot's sessions, calibrated together. A folder of datasets stands for all
+    /// Datasets; several are one robot's sessions, calibrated together. A folder of datasets means all
     /// of them.
     #[arg(required = true, value_name = "DATASET")]
     datasets: Vec<PathBuf>,
@@ -264,6 +264,9 @@ fn show(report: &CalibrationReport, robot: &NominalRobot, runs: usize, terminal:
         for warning in &method.warnings {
             terminal.remark(&format!("warning: {name}: {warning}"));
         }
+        for remark in &method.remarks {
+            terminal.remark(&format!("warning: {name}: {remark}"));
+        }
         if let Some(latency_s) = method.parameters.get("latency_s").and_then(|latency| latency.value) {
             let late = if latency_s < 0.0 { "early" } else { "late" };
             terminal.say(&format!("  the poses are {:.1} ms {late} against the log", 1e3 * latency_s.abs()))?;
@@ -293,15 +296,16 @@ pub(crate) fn why_no_result(method: &MethodReport) -> Option<String> {
         return Some(format!("{name}: no run was used{why}; yair check says what is wrong with them"));
     }
     if !method.determines_anything() {
-        let why = method.not_observable.first().map_or("", |blind| blind.why.as_str());
-        return Some(format!("{name}: these runs determine no parameter by itself: {why}"));
+        let mut reasons: Vec<&str> = method.not_observable.iter().map(|blind| blind.why.as_str()).collect();
+        reasons.dedup();
+        return Some(format!("{name}: these runs determine no parameter by itself: {}", reasons.join("; ")));
     }
     if !method.converged {
         let why = "the fit did not converge, so that its numbers are no result; yair check says what is wrong";
         return Some(format!("{name}: {why}"));
     }
     if let Some(warning) = method.warnings.first() {
-        return Some(format!("{name}: the result cannot be the stated robot: {warning}"));
+        return Some(format!("{name}: the result is no correction of the stated robot: {warning}"));
     }
     None
 }

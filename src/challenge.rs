@@ -18,8 +18,7 @@ use crate::new_folders::NewFolders;
 use crate::shard::{ShardChoice, locked};
 use crate::terminal::{Failure, Terminal, cell, table};
 
-/// The blind benchmark of `diagnose`: random robots with hidden effects, nulls and effects that are left out
-/// of the catalogue, against an oracle.
+/// Challenge `diagnose` by the blind benchmark: random robots with hidden effects, against an oracle.
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// How many cases; the bars are meant for 2000 and more, and a case takes seconds of a core. Without it
@@ -134,7 +133,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     if let Some(shard) = shard {
         let out = arguments.out.as_deref().unwrap_or(Path::new("."));
         ChallengeShard::new(ChallengeCampaign::new(arguments.seed, cases, scope), shard, outcomes).write(out)?;
-        terminal.remark(&format!("part {shard} stands in {}; --merge puts the parts together", out.display()));
+        terminal.remark(&format!("part {shard} is in {}; --merge combines the parts", out.display()));
         return Ok(ExitCode::SUCCESS);
     }
     let result = ChallengeResult::of(arguments.seed, outcomes);

@@ -7,7 +7,7 @@
 use std::path::{Path, PathBuf};
 
 use bench::Shard;
-use blind_benchmark::{CaseOutcome, Scope};
+use blind_benchmark::{CaseOutcome, Scope, are_outcomes_of};
 use serde::{Deserialize, Serialize};
 
 use crate::terminal::Failure;
@@ -79,6 +79,9 @@ pub(crate) fn merged(folders: &[PathBuf]) -> Result<(ChallengeCampaign, Vec<Case
     for folder in folders {
         let part = ChallengeShard::read(folder)?;
         let shard: Shard = part.shard.parse().map_err(|why| format!("{}: shard: {why}", folder.display()))?;
+        if !are_outcomes_of(&part.outcomes, shard.share(part.campaign.cases), part.campaign.scope) {
+            return Err(format!("{}: its cases are not those of part {shard}", folder.display()).into());
+        }
         parts.push((shard.of_all(), folder, part));
     }
     parts.sort_by_key(|(numbers, ..)| *numbers);

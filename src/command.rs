@@ -9,17 +9,19 @@
 //! ```
 
 use std::ffi::OsString;
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 
 use anstream::{AutoStream, ColorChoice};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::signals::Signals;
-use crate::terminal::{Printed, Terminal};
+use crate::terminal::{Printed, Terminal, import_command};
 use crate::{
     calibrate, challenge, check, command_line, compare, correct, demo, diagnose_command, evaluate, export_command,
-    fleet_command, help, import, manual, merge, plan, reproduce, simulate, sweep,
+    fleet_command, help, import, manual, merge, plan, replay_case, reproduce, simulate, sweep,
 };
 
 pub use crate::watch::{Progress, Watch};
@@ -30,10 +32,10 @@ pub use crate::watch::{Progress, Watch};
 pub(crate) struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
-    /// Print one JSON document on standard output and nothing else there.
+    /// Print one JSON document on standard output and nothing else there; of a failure, one with `error`.
     #[arg(long, global = true)]
     json: bool,
-    /// No progress and no remarks.
+    /// No progress, no remarks, and no lines on what was read or written: results and errors alone.
     #[arg(long, global = true)]
     quiet: bool,
 }
@@ -44,6 +46,7 @@ enum Command {
     Simulate(simulate::Arguments),
     Import(import::Arguments),
     Check(check::Arguments),
+    ReplayCase(replay_case::Arguments),
     Calibrate(calibrate::Arguments),
     Diagnose(diagnose_command::Arguments),
     Challenge(challenge::Arguments),
@@ -90,7 +93,11 @@ pub fn main(arguments: impl IntoIterator<Item = impl Into<OsString>>) -> u8 {
         }
         Err(error) if error.use_stderr() => {
             let _ = error.print();
-            return USAGE;
+            let is_flag =
+                |of: &str| arguments.iter().take_while(|argument| *argument != "--").any(|argument| argument == of);
+            let terminal = Terminal::new(is_flag("--json"), true, signals);
+            terminal.usage_error(&first_paragraph(&error.render().to_string()));
+            (terminal, USAGE)
         }
         Err(help) => {
             let terminal = Terminal::new(false, false, signals);
@@ -127,14 +134,35 @@ fn grammar() -> clap::Command {
 
 fn parsed(arguments: &[OsString]) -> Result<Cli, clap::Error> {
     let mut grammar = grammar();
-    let matches = grammar.try_get_matches_from_mut(arguments)?;
+    let matches = grammar.try_get_matches_from_mut(arguments).map_err(|error| with_format(error, &mut grammar))?;
     Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut grammar))
+}
+
+/// What clap says before it shows the usage.
+fn first_paragraph(text: &str) -> String {
+    let paragraph = text.split("\n\n").next().unwrap_or_default();
+    paragraph.strip_prefix("error: ").unwrap_or(paragraph).split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// The mistake of `yair import FILE` in words that say what to type.
+fn with_format(error: clap::Error, grammar: &mut clap::Command) -> clap::Error {
+    let named = match error.get(ContextKind::InvalidSubcommand) {
+        Some(ContextValue::String(name)) => PathBuf::from(name),
+        _ => return error,
+    };
+    if !(named.exists() || named.extension().is_some()) {
+        return error;
+    }
+    let (place, command) = (named.display(), import_command(&named));
+    let message = format!("{place} is no format but a file, and its format comes first; did you mean: {command}");
+    clap::Error::raw(ErrorKind::InvalidSubcommand, message).format(grammar)
 }
 
 fn run(cli: &Cli, arguments: &[OsString], terminal: &Terminal) -> u8 {
     command_line::keep(arguments);
     let Some(command) = &cli.command else {
         terminal.remark(help::first_steps());
+        terminal.usage_error("no subcommand is given; yair --help lists them");
         return USAGE;
     };
     let outcome = match command {
@@ -142,6 +170,7 @@ fn run(cli: &Cli, arguments: &[OsString], terminal: &Terminal) -> u8 {
         Command::Simulate(arguments) => simulate::run(arguments, terminal),
         Command::Import(arguments) => import::run(arguments, terminal),
         Command::Check(arguments) => check::run(arguments, terminal),
+        Command::ReplayCase(arguments) => replay_case::run(arguments, terminal),
         Command::Calibrate(arguments) => calibrate::run(arguments, terminal),
         Command::Diagnose(arguments) => diagnose_command::run(arguments, terminal),
         Command::Challenge(arguments) => challenge::run(arguments, terminal),

@@ -14,12 +14,12 @@ use crate::calibration_file::GivenCalibration;
 use crate::html_report;
 use crate::terminal::{Failure, Terminal, cell, read_datasets, table};
 
-/// Which calibration holds on sessions that it has not seen?
+/// Compare calibrations on sessions that were not used for them.
 ///
 /// Calibrates one robot on each of its sessions with every method, and evaluates on every other session.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Datasets, each one a session of the same robot; a folder of datasets stands for all of them.
+    /// Datasets, each one a session of the same robot; a folder of datasets means all of them.
     #[arg(required = true, value_name = "DATASET")]
     datasets: Vec<PathBuf>,
     /// Method; may be given several times. Without it, every one.
@@ -101,7 +101,8 @@ fn show(comparison: &Comparison, given: usize, terminal: &Terminal) -> Result<()
         nominal.kinds.iter().map(|mean| (mean.evaluated_on.as_str(), sessions_of(&mean.evaluated_on))).collect();
     let counts: Vec<String> = kinds.iter().map(|(kind, count)| format!("{count} of {kind}")).collect();
     terminal.say(&format!("{} sessions: {}", comparison.sessions.len(), counts.join(", ")))?;
-    terminal.say("mean error at the ends of runs that the calibration has not seen; n = ordered pairs of sessions")?;
+    terminal
+        .say("mean error at the ends of runs that the calibration was not fitted to; n = ordered pairs of sessions")?;
     for evaluated in kinds.chunks(KINDS_A_TABLE) {
         // Units stand in the last line, a kind's name as low above them as it goes.
         let lines = evaluated.iter().map(|(kind, _)| kind.split(" + ").count()).max().unwrap_or(1);

@@ -17,10 +17,10 @@ use crate::new_folders::NewFolders;
 use crate::simulate::refuse_filled;
 use crate::terminal::{Failure, Terminal, datasets_at, folder_name, warn};
 
-/// Corrected poses at every row of the logs, from each run's first truth pose where it has one.
+/// Write the corrected pose of every row of a log.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Datasets of the robot; a folder of datasets stands for all of them.
+    /// Datasets of the robot; a folder of datasets means all of them.
     #[arg(required = true, value_name = "DATASET")]
     datasets: Vec<PathBuf>,
     /// Calibration file from `yair calibrate --out`, or extended model from `yair diagnose --out`.
@@ -92,7 +92,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     calibration.remark(terminal);
     let runs = || datasets.iter().flat_map(|dataset| &dataset.runs);
     let rows: usize = runs().map(|run| run.rows).sum();
-    terminal.say(&format!("{} runs, {rows} corrected poses in {}", runs().count(), out.display()))?;
+    terminal.note(&format!("{} runs, {rows} corrected poses in {}", runs().count(), out.display()))?;
     let calibration = calibration.calibration().calibration.name.clone();
     terminal.document(&Document { calibration, out: out.display().to_string(), datasets })?;
     Ok(ExitCode::SUCCESS)

@@ -19,8 +19,7 @@ use crate::new_folders::NewFolders;
 use crate::simulate::{refuse_filled, write_dataset, write_whole};
 use crate::terminal::{Failure, Terminal};
 
-/// The whole story in a minute: a robot with a hidden fault is simulated, calibrated, diagnosed and
-/// corrected, and drives what its diagnosis asks for.
+/// Show the whole job in a minute: simulate a robot with a hidden fault, calibrate, diagnose and correct it.
 ///
 /// The exit code is 0 only where the hidden fault is among the names that are found.
 #[derive(Args)]
@@ -108,7 +107,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     first.provenance.name = Some("demo".to_owned());
     write_dataset(&first, &path("robot"), arguments.force)?;
     terminal.say(&format!(
-        "1. A robot with a hidden fault drove {} runs: {}",
+        "1. A simulated robot with a hidden fault drives {} runs: {}",
         first.runs.len(),
         path("robot").display()
     ))?;
@@ -117,7 +116,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let mut given = vec![path("robot")];
     let mut diagnosis = diagnosed(&datasets, &given, (&path("diagnosis"), arguments.force), terminal)
         .map_err(|why| format!("{} was hidden, and it cannot be diagnosed: {why}", hidden.id))?;
-    terminal.say(&format!("2. It was calibrated and diagnosed. {}.", diagnosis.document.sentence))?;
+    terminal.say(&format!("2. Calibration and diagnosis: {}.", diagnosis.document.sentence))?;
     tell(&diagnosis, terminal)?;
 
     let mut new = sim_yair::simulate(&robot, seed, NEW)?.dataset;
@@ -127,7 +126,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let drift = Drift { nominal, calibrated, extended };
     let shown = |percent: Option<f64>| percent.map_or_else(|| "–".to_owned(), |percent| format!("{percent:.3} %"));
     terminal.say(&format!(
-        "3. In a new session, which nothing was fitted to, dead reckoning drifts {} with the nominal robot, {} with the calibrated one, {} with the extended one.",
+        "3. In a new session, dead reckoning drifts {} as configured, {} calibrated, {} with the fault corrected.",
         shown(nominal),
         shown(calibrated),
         shown(extended)
@@ -146,7 +145,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
             given.push(path(&name));
             datasets.push(driven);
         }
-        terminal.say(&format!("4. It drove what the diagnosis asked for: {}.", next.drive))?;
+        terminal.say(&format!("4. The robot drives what the diagnosis asks for: {}.", next.drive))?;
         match diagnosed(&datasets, &given, (&path("diagnosis-after-plan"), arguments.force), terminal) {
             Ok(after) => {
                 diagnosis = after;
@@ -155,7 +154,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
                 tell(&diagnosis, terminal)?;
             }
             Err(why) => {
-                terminal.remark(&format!("warning: the first diagnosis stands, with these runs there is none: {why}"));
+                terminal.remark(&format!("warning: the first diagnosis remains; these runs have no diagnosis: {why}"));
             }
         }
     } else {
@@ -227,8 +226,10 @@ fn drawn(id: &'static str, robot: &Scenario, draws: Address) -> Result<Hidden, &
     if of.benchmark.needs.payload || of.benchmark.needs.jitter {
         return Err("it needs loads or irregular stamps, which this robot does not have");
     }
-    if of.benchmark.needs.length {
-        return Err("it needs a length that does not come from the instrument, which this robot does not have");
+    if of.benchmark.needs.others {
+        return Err(
+            "it needs a length that does not come from the instrument, or wheels that skid in turns; this robot has neither",
+        );
     }
     let host = HostRobot {
         cruise_speed_m_s: robot.robot.cruise_speed_m_s,
@@ -283,7 +284,7 @@ fn tell(diagnosis: &Diagnosis, terminal: &Terminal) -> Result<(), Failure> {
 /// What was hidden, and what became of it.
 fn verdict(hidden: &Hidden, finding: Option<&Finding>, first: bool, terminal: &Terminal) -> Result<(), Failure> {
     let sizes: Vec<String> = hidden.parameters.iter().map(|(name, value)| format!("{name} = {value:.3e}")).collect();
-    terminal.say(&format!("Hidden was {} ({}): {}", hidden.id, hidden.meaning, sizes.join(", ")))?;
+    terminal.say(&format!("The hidden fault was {} ({}): {}", hidden.id, hidden.meaning, sizes.join(", ")))?;
     let Some(finding) = finding else {
         return terminal.say("It was not found.");
     };
@@ -295,8 +296,8 @@ fn verdict(hidden: &Hidden, finding: Option<&Finding>, first: bool, terminal: &T
             None => format!("{name} = {:.3e}", of.value),
         })
         .collect();
-    let named = if first { "and rightly named".to_owned() } else { format!("among {}", finding.names.join(", ")) };
-    terminal.say(&format!("It was found, {named}: {}", sizes.join(", ")))?;
+    let named = if first { "and named correctly".to_owned() } else { format!("among {}", finding.names.join(", ")) };
+    terminal.say(&format!("It was found {named}: {}", sizes.join(", ")))?;
     match sigmas_off(hidden, finding) {
         Some(sigmas) if sigmas > MAX_SIGMAS => terminal.say(&format!(
             "Its size is off by {sigmas:.0} standard deviations: at this size the fault is not what its linear term says"

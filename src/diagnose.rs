@@ -19,11 +19,10 @@ use crate::plain_text::one_line;
 use crate::simulate::{refuse_filled, write_folder, write_whole};
 use crate::terminal::{Failure, Terminal, advance, cell, table};
 
-/// What the calibrated model gets wrong: the causes that explain it, the extended model, and the gain
-/// on runs that it has not seen.
+/// Find what a calibration leaves: the cause, its size, and what its correction gains on held-out runs.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Datasets; several are one robot's sessions, diagnosed together. A folder of datasets stands for all of
+    /// Datasets; several are one robot's sessions, diagnosed together. A folder of datasets means all of
     /// them.
     #[arg(required = true, value_name = "DATASET")]
     datasets: Vec<PathBuf>,
@@ -116,9 +115,9 @@ fn reservations(document: &Document) -> String {
     let of = |finding: &Finding| {
         let what = match (finding.carries_over, finding.in_extended_model) {
             (Some(true), _) => return None,
-            (Some(false), _) => "is left out, as it does not carry over",
+            (Some(false), _) => "is left out, as it does not hold elsewhere",
             (None, Some(false)) => "is left out, as its cause is not established",
-            (None, _) => "may not carry over to other sessions and kinds of path",
+            (None, _) => "may not hold in other sessions and kinds of path",
         };
         finding
             .is_of_the_mean()
@@ -134,7 +133,7 @@ fn show_nested(nested: &NestedGain, terminal: &Terminal) -> Result<(), Failure> 
         _ => ("sessions", "session"),
     };
     terminal.say(&format!(
-        "with whole {whole} left out of the diagnosis, {} in turn, {} of which leave nothing to add:",
+        "with whole {whole} left out of the diagnosis, {} in turn ({} without an extension):",
         nested.units, nested.abstained
     ))?;
     let mut rows = table(&[unit, "found by the others", "ends off, mm", "extended", "gain, 95 %"], 2);
@@ -185,11 +184,11 @@ fn show(document: &Document, terminal: &Terminal) -> Result<(), Failure> {
             terminal.say(&finding.sentence)?;
             if finding.is_of_the_mean() && finding.carries_over != Some(false) {
                 let carries = match (finding.carries_over, finding.in_extended_model) {
-                    (Some(_), _) => "carries over",
+                    (Some(_), _) => "consistent",
                     (None, Some(false)) => {
-                        "left out of the extended model, as its cause is not established; cannot be told whether it carries over"
+                        "not in the extended model, as its cause is not established; whether it holds elsewhere is open"
                     }
-                    (None, _) => "cannot be told whether it carries over",
+                    (None, _) => "whether it holds elsewhere is open",
                 };
                 terminal.say(&format!("  {carries}: {}", finding.carries_over_why))?;
             }
@@ -223,7 +222,7 @@ fn show(document: &Document, terminal: &Terminal) -> Result<(), Failure> {
         show_nested(nested, terminal)?;
     }
     if let Some(next) = &document.next_experiment {
-        terminal.say(&format!("next experiment (yair plan tells more): {}", next.drive))?;
+        terminal.say(&format!("next experiment (details: yair plan): {}", next.drive))?;
     }
     let blind: Vec<&str> = document.blind_to.iter().map(|blind| blind.id.as_str()).collect();
     if !blind.is_empty() {

@@ -1,9 +1,13 @@
 //! `yair evaluate DATASET... [--calibration FILE]... [--max-drift PERCENT]`
 
-use std::path::PathBuf;
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use calib::{Alignment, CalibrationDrift, Delta, DeltaUnit, EvaluationOptions, Names, PoseErrorOptions};
+use calib::{
+    Alignment, AugmentedCalibration, CalibrationDrift, Delta, DeltaUnit, EvaluatedInstrument, EvaluationOptions,
+    NamedCalibration, Names, PoseErrorOptions, StartsBy, with_instrument,
+};
 use clap::Args;
 use dataset::{Loaded, RunByRun, Warning};
 use serde::Serialize;
@@ -14,15 +18,14 @@ use crate::html_report::{EvaluationPage, refuse_file};
 use crate::import_robot::named;
 use crate::terminal::{Failure, Terminal, cell, datasets_at, folder_name, table, warn};
 
-/// Drift and pose errors of dead reckoning against the truth, under the nominal values and under each
-/// calibration
+/// Measure the drift of dead reckoning: with the values as configured, and with each calibration
 ///
 /// APE and RPE are those of evo (evo_ape, evo_rpe) on the same poses: absolute errors at the truth's
 /// instants, and errors of the motion between poses that are a step apart. RPE counts every pair of poses
 /// of a run once, of all runs together.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Datasets with absolute truth; a folder of datasets stands for all of them.
+    /// Datasets with absolute truth; a folder of datasets means all of them.
     #[arg(required = true, value_name = "DATASET")]
     datasets: Vec<PathBuf>,
     /// Calibration file from `yair calibrate --out`, or extended model from `yair diagnose --out`; may be
@@ -120,6 +123,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let (names, calibrations) = evaluate(&paths, &found, pose_errors, terminal)?;
     found.iter().flatten().for_each(|given| given.remark(terminal));
     show(&calibrations, terminal)?;
+    show_instruments(&calibrations, terminal)?;
     show_pose_errors(&calibrations, &pose_errors, terminal)?;
     if arguments.runs {
         show_runs(&calibrations, terminal)?;
@@ -156,12 +160,23 @@ fn evaluate(
     let mut names = Vec::with_capacity(paths.len());
     let (mut seen, mut all) = (vec![0_usize; calibrations.len()], 0_usize);
     let mut runs = vec![Vec::new(); calibrations.len()];
+    let mut mounting_from: Vec<Option<String>> = vec![None; calibrations.len()];
     for path in paths {
         let opened = RunByRun::open(path)?;
+        let name = opened.header().provenance.name.clone().unwrap_or_else(|| folder_name(path));
+        let in_session: Vec<Option<Cow<'_, AugmentedCalibration>>> =
+            calibrations.iter().map(|given| Some(given.as_ref()?.calibration().in_session(&name))).collect();
+        let instrument = instrument_of(path, &in_session);
+        let evaluated: Vec<Option<Cow<'_, AugmentedCalibration>>> =
+            in_session.iter().map(|given| with_instrument(given.as_deref(), instrument.as_ref())).collect();
+        for (given, from) in in_session.iter().zip(&mut mounting_from) {
+            let own = given.as_ref().map(|given| &given.calibration).filter(|own| own.has_instrument());
+            let shared = || instrument.as_ref().map(|instrument| instrument.from.clone());
+            *from = own.map(|own| own.name.clone()).or_else(shared);
+        }
         let place = path.display().to_string();
         let warn = |warnings: &[Warning]| warn(path, warnings, terminal);
         warn(opened.warnings());
-        let name = opened.header().provenance.name.clone().unwrap_or_else(|| folder_name(path));
         let robot = opened.header().robot;
         calibrations.iter().flatten().try_for_each(|given| given.check(&robot, &place))?;
         for given in calibrations.iter().flatten() {
@@ -180,10 +195,11 @@ fn evaluate(
                 *seen += dataset.runs.iter().filter(trained).count();
             }
             let session = dataset.session();
-            let each = calibrations.iter().zip(&mut runs).zip(&mut driven_m);
-            for ((given, runs), driven_m) in each.filter(|((given, _), _)| !is_of_whole_datasets(given.as_ref())) {
-                let calibration = given.as_ref().map(GivenCalibration::calibration);
-                runs.extend(calib::evaluate_runs(&session, calibration, &options, driven_m));
+            let each = calibrations.iter().zip(&evaluated).zip(runs.iter_mut().zip(&mut driven_m));
+            for ((_, calibration), (runs, driven_m)) in
+                each.filter(|((given, _), _)| !is_of_whole_datasets(given.as_ref()))
+            {
+                runs.extend(calib::evaluate_runs(&session, calibration.as_deref(), &options, driven_m));
             }
         }
         if calibrations.iter().any(|given| is_of_whole_datasets(given.as_ref())) {
@@ -201,15 +217,56 @@ fn evaluate(
     for (given, seen) in calibrations.iter().zip(seen) {
         if let (Some(given), 1..) = (given, seen) {
             terminal.remark(&format!(
-                "warning: {} was trained on {seen} of these {all} runs: its drift on them is no test of it; evaluate runs that it has not seen",
+                "warning: {} was trained on {seen} of these {all} runs: its drift on them is no test of it; evaluate other runs",
                 given.place()
             ));
         }
     }
-    let of_runs = |(given, runs): (&Option<GivenCalibration>, _)| {
-        CalibrationDrift::of_runs(given.as_ref().map(|given| &given.calibration().calibration), runs)
+    let of_runs = |((given, mounting_from), runs): ((&Option<GivenCalibration>, Option<String>), _)| {
+        let calibration = given.as_ref().map(|given| &given.calibration().calibration);
+        CalibrationDrift { mounting_from, ..CalibrationDrift::of_runs(calibration, runs) }
     };
-    Ok((names, calibrations.iter().zip(runs).map(of_runs).collect()))
+    Ok((names, calibrations.iter().zip(mounting_from).zip(runs).map(of_runs).collect()))
+}
+
+/// Rows of a dataset to which an instrument is fitted, at the most: a second of one core.
+const MAX_FITTED_ROWS: usize = 1 << 17;
+
+/// The instrument of those calibrations that have none of their own.
+fn instrument_of(path: &Path, calibrations: &[Option<Cow<'_, AugmentedCalibration>>]) -> Option<EvaluatedInstrument> {
+    let named = || calibrations.iter().flatten().map(|given| &given.calibration);
+    if named().all(NamedCalibration::has_instrument) && !calibrations.iter().any(Option::is_none) {
+        return None;
+    }
+    let (mut datasets, _) = check::beginnings(&[path.to_owned()], MAX_FITTED_ROWS)?;
+    for dataset in &mut datasets {
+        dataset.leave_out_gyros_beside_poses();
+    }
+    EvaluatedInstrument::of(named(), &datasets.first()?.session())
+}
+
+/// Where the instrument is taken from, where it is not taken to be at the centre.
+fn show_instruments(calibrations: &[CalibrationDrift], terminal: &Terminal) -> Result<(), Failure> {
+    let mut shown: Vec<&String> = Vec::new();
+    for from in calibrations.iter().filter_map(|drift| drift.mounting_from.as_ref()) {
+        if !shown.contains(&from) {
+            shown.push(from);
+            let of: Vec<&str> = calibrations
+                .iter()
+                .filter(|drift| drift.mounting_from.as_ref() == Some(from) && drift.name != *from)
+                .map(|drift| drift.name.as_str())
+                .collect();
+            if !of.is_empty() {
+                terminal.say(&format!("place and latency of the instrument for {}: from {from}", of.join(", ")))?;
+            }
+        }
+    }
+    for way in [StartsBy::FirstTenth, StartsBy::Chain] {
+        if calibrations.iter().flat_map(|drift| &drift.runs).any(|run| run.starts_by == Some(way)) {
+            terminal.say(way.sentence())?;
+        }
+    }
+    Ok(())
 }
 
 /// Datasets of at most so many bytes of text are held as a whole, for the picture of their paths: a machine

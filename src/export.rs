@@ -17,12 +17,13 @@ use serde::Serialize;
 use crate::calibration_file::{GivenCalibration, is_scenario};
 use crate::correct::{file_of, only};
 use crate::export_drift::{self, Drift};
+use crate::export_into;
 use crate::export_mcap;
 use crate::new_folders::NewFolders;
 use crate::simulate::{refuse_filled, write_whole};
 use crate::terminal::{Failure, Terminal, listed_ids, warn};
 
-/// Calibrated parameters for a robot's own program, or a dataset's truth for other tools.
+/// Export calibrated parameters to a robot's own program, or a dataset's truth to other tools.
 #[derive(Args)]
 #[command(after_help = formats())]
 pub(crate) struct Arguments {
@@ -36,6 +37,13 @@ pub(crate) struct Arguments {
     /// File to write; standard output when left out. For `tum` a folder, with RUN.tum of every run.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// A file of the robot, such as controllers.yaml, robot.urdf or lino_base_config.h: the values are put
+    /// into their places in it, everything else stays, and the changed lines are shown.
+    #[arg(long, value_name = "FILE", conflicts_with = "out")]
+    into: Option<PathBuf>,
+    /// --into: show the changed lines, and write nothing.
+    #[arg(long, requires = "into")]
+    dry_run: bool,
     /// --replace and --without-effects together.
     #[arg(long)]
     force: bool,
@@ -43,7 +51,7 @@ pub(crate) struct Arguments {
     #[arg(long)]
     replace: bool,
     /// Export the geometry of an extended model in a format that cannot express its effects: it was fitted
-    /// beside them and is not right alone.
+    /// with them and is not right alone.
     #[arg(long)]
     without_effects: bool,
     /// A dataset of the robot, for nominal values that the calibration file does not have; c: with absolute
@@ -53,19 +61,20 @@ pub(crate) struct Arguments {
     /// Which calibration of a file with several.
     #[arg(long, value_name = "METHOD")]
     method: Option<String>,
-    /// ros2-yaml: name of the controller's node [default: diff_drive_controller].
+    /// Formats of YAML: name of the node, as in diff_drive_controller. --into: which one of the file's.
     #[arg(long, value_name = "NAME")]
     controller: Option<String>,
-    /// ros2-yaml: nominal lengths, and multipliers that make them the calibrated ones (the default).
+    /// ros2-yaml and its like: nominal lengths, and multipliers that make them the calibrated ones (the
+    /// default).
     #[arg(long, conflicts_with = "lengths")]
     multipliers: bool,
-    /// ros2-yaml: the calibrated geometry; multipliers hold the difference of the wheels alone.
+    /// ros2-yaml and its like: the calibrated geometry; multipliers hold the difference of the wheels alone.
     #[arg(long)]
     lengths: bool,
-    /// ros2-yaml: speed at which the twist's covariance is stated [default: 0.25].
+    /// ros2-yaml and its like: speed at which the twist's covariance is stated [default: 0.25].
     #[arg(long, value_name = "M/S")]
     speed: Option<f64>,
-    /// ros2-yaml: rate of the controller's twists [default: 50].
+    /// ros2-yaml and its like: rate of the controller's twists [default: 50].
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
     /// c: width of the wheels' counters, 8 to 64 bits [default: the dataset's, or 32].
@@ -84,7 +93,7 @@ pub(crate) struct Arguments {
 const TUM: &str = "tum";
 const MCAP: &str = "mcap";
 /// Flags of calibrations alone, and of datasets alone.
-const OF_CALIBRATIONS: [&str; 3] = ["dataset", "method", "without-effects"];
+const OF_CALIBRATIONS: [&str; 4] = ["dataset", "method", "without-effects", "into"];
 const OF_DATASETS: [&str; 2] = ["calibration", "run"];
 
 fn formats() -> String {
@@ -93,7 +102,7 @@ fn formats() -> String {
         (MCAP, "a dataset's truth, paths and wheels as a bag of ROS 2, for Foxglove, PlotJuggler and evo"),
     ];
     let all = EXPORTERS.iter().map(|format| (format.name, format.about)).chain(of_datasets);
-    let lines: Vec<String> = all.map(|(name, about)| format!("  {name:12} {about}")).collect();
+    let lines: Vec<String> = all.map(|(name, about)| format!("  {name:18} {about}")).collect();
     format!("Formats:\n{}", lines.join("\n"))
 }
 
@@ -105,6 +114,11 @@ struct Document {
     /// The file or folder; null where the text stands in this document.
     out: Option<String>,
     text: Option<String>,
+    /// The robot's own file that was edited, and its changed lines.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    into: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    diff: Option<String>,
     /// Effects of an extended model that the format cannot express.
     left_out: Vec<LeftOut>,
     cautions: Vec<String>,
@@ -162,6 +176,7 @@ impl Arguments {
         let given = [
             ("dataset", self.dataset.is_some()),
             ("method", self.method.is_some()),
+            ("into", self.into.is_some()),
             ("controller", self.controller.is_some()),
             ("multipliers", self.multipliers),
             ("lengths", self.lengths),
@@ -181,9 +196,9 @@ impl Arguments {
     }
 
     fn options(&self) -> Options {
-        let Options { controller, lengths, speed_m_s, rate_hz, .. } = Options::default();
+        let Options { lengths, speed_m_s, rate_hz, .. } = Options::default();
         Options {
-            controller: self.controller.clone().unwrap_or(controller),
+            controller: self.controller.clone(),
             lengths: if self.lengths { Lengths::Calibrated } else { lengths },
             speed_m_s: self.speed.unwrap_or(speed_m_s),
             rate_hz: self.rate.unwrap_or(rate_hz),
@@ -199,7 +214,6 @@ fn export_calibration(format: &Exporter, arguments: &Arguments, terminal: &Termi
     let options = arguments.options();
     options.check()?;
     let robot = robot(arguments, terminal)?;
-    let text = (format.render)(&robot, &options)?;
     let why = |of: OnBoard| format.has_effects.then(|| of.detail());
     let left_out: Vec<LeftOut> = robot
         .left_out(format.has_effects)
@@ -219,26 +233,36 @@ fn export_calibration(format: &Exporter, arguments: &Arguments, terminal: &Termi
         true => Some(export_drift::of(&robot, &arguments.source, arguments.dataset.as_deref(), &options, terminal)?),
         false => None,
     };
-    match &arguments.out {
-        Some(out) => {
-            write_whole(out, text.as_bytes())?;
-            terminal.say(&format!("{} in {}", format.name, out.display()))?;
+    let (name, mut cautions) = (robot.name.clone(), robot.cautions.clone());
+    let (mut text, mut changed) = (None, None);
+    match (&arguments.into, &arguments.out) {
+        (Some(file), _) => {
+            let put = export_into::run(format, robot, &options, file, arguments.dry_run, terminal)?;
+            cautions.extend(put.remarks);
+            changed = Some(put.diff);
+        }
+        (None, Some(out)) => {
+            write_whole(out, (format.render)(&robot, &options)?.as_bytes())?;
+            terminal.note(&format!("{} in {}", format.name, out.display()))?;
             drift.as_ref().map_or(Ok(()), |drift| terminal.say(&drift.text()))?;
         }
-        None => {
+        (None, None) => {
             // The text alone stands on standard output.
-            terminal.say(text.trim_end_matches('\n'))?;
+            let rendered = text.insert((format.render)(&robot, &options)?);
+            terminal.say(rendered.trim_end_matches('\n'))?;
             drift.iter().for_each(|drift| terminal.remark(&drift.text()));
         }
     }
     terminal.document(&Document {
         format: format.name.to_owned(),
         source: arguments.source.display().to_string(),
-        calibration: Some(robot.name.clone()),
+        calibration: Some(name),
         out: arguments.out.as_ref().map(|out| out.display().to_string()),
-        text: arguments.out.is_none().then_some(text),
+        text,
+        into: arguments.into.as_ref().map(|file| file.display().to_string()),
+        diff: changed,
         left_out,
-        cautions: robot.cautions,
+        cautions,
         drift_percent: drift,
         runs: Vec::new(),
     })?;
@@ -257,7 +281,7 @@ fn refuse_misleading(format: &Exporter, robot: &CalibratedRobot, source: &Path) 
         return Ok(());
     }
     Err(format!(
-        "{}: its geometry is right beside {}, which {} cannot express; export the calibration.toml that `yair diagnose --out` writes beside it, or \
+        "{}: its geometry is right only with {}, which {} cannot express; export the calibration.toml that `yair diagnose --out` writes next to it, or \
          `yair export c {0}`; --without-effects writes it all the same",
         source.display(),
         beside.join(", "),
@@ -401,7 +425,7 @@ fn export_dataset(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
                 atomic_file::write_whole(file, text.as_bytes())
                     .map_err(|error| format!("{}: {}", file.display(), error.kind()))?;
             }
-            terminal.say(&format!("{} runs in {}", texts.len(), out.display()))?;
+            terminal.note(&format!("{} runs in {}", texts.len(), out.display()))?;
             None
         }
         (None, texts) => {
@@ -416,6 +440,8 @@ fn export_dataset(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         calibration: calibration.map(|of| of.calibration().calibration.name.clone()),
         out: arguments.out.as_ref().map(|out| out.display().to_string()),
         text,
+        into: None,
+        diff: None,
         left_out: Vec::new(),
         cautions: Vec::new(),
         drift_percent: None,

@@ -3,7 +3,6 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
-use std::io::Cursor;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -72,9 +71,7 @@ pub(crate) fn run(
         given.remark(terminal);
     }
     let mut cautions = Vec::new();
-    let mut bytes = Cursor::new(Vec::new());
-    let failed = |error| format!("{}: {error}", out.display());
-    let mut recorder = Recorder::new(&mut bytes).map_err(failed)?;
+    let mut recorder = Recorder::default();
     let chosen: Vec<&Run> = dataset.runs.iter().filter(|run| only.is_none_or(|id| run.info.id == id)).collect();
     for run in &chosen {
         let recorded = RecordedRun {
@@ -84,7 +81,7 @@ pub(crate) fn run(
             gyro: None,
             paths: paths.iter().filter_map(|path| path.get(&run.info.id).cloned()).collect(),
         };
-        recorder.push(&recorded).map_err(failed)?;
+        recorder.push(&recorded).map_err(|error| format!("{}: {error}", out.display()))?;
     }
     cautions.extend(truth_cautions(&chosen));
     if matches!(chosen.first().map(|run| &run.odometry.wheels), Some(WheelLog::Ticks(_)))
@@ -92,18 +89,18 @@ pub(crate) fn run(
     {
         cautions.push("no /joint_states: counts need ticks_per_rev in dataset.toml".to_owned());
     }
-    let topics = recorder.finish().map_err(failed)?;
+    let (bytes, topics) = recorder.finish();
     for caution in &cautions {
         terminal.remark(&format!("warning: {place}: {caution}"));
     }
-    write_whole(out, bytes.get_ref())?;
+    write_whole(out, &bytes)?;
     let mut lines = table(&["topic", "type", "messages"], 2);
     for RecordedTopic { topic, type_name, messages } in &topics {
         lines.add_row([topic.clone(), (*type_name).to_owned(), messages.to_string()]);
     }
     terminal.say(&lines.to_string())?;
     let times = format!("the first is stamped {FIRST_STAMP_S} s, each later one begins {RUN_GAP_S} s after the last");
-    terminal.say(&format!("{} runs in {}, poses in frame {WORLD_FRAME}; {times}", chosen.len(), out.display()))?;
+    terminal.note(&format!("{} runs in {}, poses in frame {WORLD_FRAME}; {times}", chosen.len(), out.display()))?;
     terminal.document(&Document {
         format: "mcap",
         source: place,
@@ -131,7 +128,7 @@ fn topic_name(calibration: &str, taken: &[PathName]) -> String {
 
 /// The path by the stated values.
 fn nominal(dataset: &Dataset, place: &str) -> Result<Paths, Failure> {
-    let stated = NamedCalibration { name: NOMINAL.to_owned(), values: BTreeMap::new() };
+    let stated = NamedCalibration::new(NOMINAL.to_owned(), BTreeMap::new());
     paths(NOMINAL, dataset, &stated.into(), place, |_| None)
 }
 

@@ -15,11 +15,12 @@ const GROUPS: &[(&str, &[Entry])] = &[
                 &[
                     "yair import csv log.csv --out mine --wheel 0.15 --base 0.3 --ticks-per-rev 4096",
                     "yair import ros2 bag.mcap --list",
-                    "yair import ros2 bag.mcap --out mine --wheel 0.15 --base 0.3",
+                    "yair import ros2 bag.mcap --out mine --robot controllers.yaml",
                     "yair import tum truth.tum --odometry odometry.tum --out mine --wheel 0.15 --base 0.3",
                 ],
             ),
-            ("check", &["yair check mine"]),
+            ("check", &["yair check mine", "yair check mine --bundle case.zip"]),
+            ("replay-case", &["yair replay-case case.zip"]),
             ("calibrate", &["yair calibrate mine --out mine.toml", "yair calibrate monday tuesday --method all"]),
             (
                 "evaluate",
@@ -46,6 +47,7 @@ const GROUPS: &[(&str, &[Entry])] = &[
                 "export",
                 &[
                     "yair export ros2-yaml mine.toml",
+                    "yair export ros2-yaml mine.toml --into controllers.yaml --dry-run",
                     "yair export c diagnosis/extended.toml --out odometry.h",
                     "yair export mcap mine --calibration mine.toml --out paths.mcap",
                 ],

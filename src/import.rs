@@ -11,9 +11,9 @@ use serde::Serialize;
 use crate::session_identity::SessionIdentity;
 use crate::simulate::begin_dataset;
 use crate::terminal::{Failure, Terminal};
-use crate::{import_csv, import_ros2, import_tum};
+use crate::{import_csv, import_motions, import_ros2, import_tum};
 
-/// Other people's logs, or your own, into datasets.
+/// Import a log: a table, a ROS bag, a trajectory, pairs of motions, or a public dataset.
 #[derive(Args)]
 pub(crate) struct Arguments {
     #[command(subcommand)]
@@ -26,6 +26,7 @@ enum Format {
     Csv(Box<import_csv::Arguments>),
     Ros2(Box<import_ros2::Arguments>),
     Tum(Box<import_tum::Arguments>),
+    Motions(Box<import_motions::Arguments>),
 }
 
 /// What every format of the table takes.
@@ -46,10 +47,13 @@ struct Plain {
 
 /// The name of the format that is none.
 const CSV: &str = "csv";
-/// Bags.
+/// Bags, of ROS 1 too.
 const ROS2: &str = "ros2";
+const ROS1: &str = "ros1";
 /// Trajectories, with wheels from another file.
 const TUM: &str = "tum";
+/// Relative motions in pairs.
+const MOTIONS: &str = "motions";
 
 impl FromArgMatches for Format {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
@@ -59,6 +63,9 @@ impl FromArgMatches for Format {
             Some(importer) => Ok(Self::Known(importer, Plain::from_arg_matches(matches)?)),
             None if name == ROS2 => Ok(Self::Ros2(Box::new(import_ros2::Arguments::from_arg_matches(matches)?))),
             None if name == TUM => Ok(Self::Tum(Box::new(import_tum::Arguments::from_arg_matches(matches)?))),
+            None if name == MOTIONS => {
+                Ok(Self::Motions(Box::new(import_motions::Arguments::from_arg_matches(matches)?)))
+            }
             None => Ok(Self::Csv(Box::new(import_csv::Arguments::from_arg_matches(matches)?))),
         }
     }
@@ -72,14 +79,16 @@ impl FromArgMatches for Format {
 impl Subcommand for Format {
     fn augment_subcommands(command: Command) -> Command {
         let csv = import_csv::Arguments::augment_args(Command::new(CSV));
-        let ros2 = import_ros2::Arguments::augment_args(Command::new(ROS2));
+        let ros2 = import_ros2::Arguments::augment_args(Command::new(ROS2).visible_alias(ROS1));
         let tum = import_tum::Arguments::augment_args(Command::new(TUM));
+        let motions = import_motions::Arguments::augment_args(Command::new(MOTIONS));
         let known =
             IMPORTERS.iter().map(|importer| Plain::augment_args(Command::new(importer.name)).about(importer.about));
         command
             .subcommand(csv)
             .subcommand(ros2)
             .subcommand(tum)
+            .subcommand(motions)
             .subcommands(known)
             .subcommand_required(true)
             .subcommand_value_name("FORMAT")
@@ -90,7 +99,7 @@ impl Subcommand for Format {
     }
 
     fn has_subcommand(name: &str) -> bool {
-        [CSV, ROS2, TUM].contains(&name) || importer(name).is_some()
+        [CSV, ROS2, ROS1, TUM, MOTIONS].contains(&name) || importer(name).is_some()
     }
 }
 
@@ -114,6 +123,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         Format::Csv(arguments) => import_csv::run(arguments, terminal),
         Format::Ros2(arguments) => import_ros2::run(arguments, terminal),
         Format::Tum(arguments) => import_tum::run(arguments, terminal),
+        Format::Motions(arguments) => import_motions::run(arguments, terminal),
     }
 }
 
@@ -166,7 +176,7 @@ fn write(
     let mut datasets = Vec::with_capacity(written.len());
     for (writer, dir, runs, odometry_rows) in written {
         writer.finish()?;
-        terminal.say(&format!("{runs} runs, {odometry_rows} odometry rows in {}", dir.display()))?;
+        terminal.note(&format!("{runs} runs, {odometry_rows} odometry rows in {}", dir.display()))?;
         datasets.push(Imported { dataset: dir.display().to_string(), runs, odometry_rows });
     }
     Ok(datasets)

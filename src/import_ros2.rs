@@ -5,14 +5,14 @@ use std::process::ExitCode;
 
 use clap::Args;
 use dataset::import::csv::Rates;
-use ros_bag::{FromBag, Listing, Options, RosBagError, Took, TookTopic, WheelFields, WheelQuantity};
+use ros_bag::{FromBag, Listing, OpenBag, Options, RosBagError, Took, TookTopic, WheelFields, WheelQuantity};
 use serde::Serialize;
 
-use crate::import_robot::{RobotArguments, named, positive, rates, with_command_line};
+use crate::import_robot::{RobotArguments, Stated, named, positive, rates, with_command_line};
 use crate::simulate::write_dataset;
 use crate::terminal::{Failure, Terminal, table};
 
-/// A bag of ROS 2: a folder of rosbag2 or one .mcap file, plain or compressed
+/// A bag of ROS 2 or ROS 1: a folder of rosbag2, or one .mcap, .db3 or .bag file
 ///
 /// Two topics become a dataset: the robot's wheels and the poses of an outside instrument; with an Imu, its
 /// yaw rates too. Without such poses the straight walls that a lidar sees take their place: spin in front of
@@ -20,10 +20,11 @@ use crate::terminal::{Failure, Terminal, table};
 /// DynamicJointState (joints by name), SensorState of turtlebot3 and kobuki, WheelTicks and WheelVels of the
 /// Create 3, and the twists of Odometry and TwistStamped; any other by --left-field, --right-field and --as.
 /// Of poses: PoseStamped, PoseWithCovarianceStamped, TransformStamped, Odometry of an instrument, and
-/// TFMessage with --truth-frames.
+/// TFMessage with --truth-frames. Types of ROS 1 have the names that ROS 2 gives them. What
+/// /robot_description says of the wheels needs no flag.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Folder with metadata.yaml, or one .mcap or .mcap.zstd file.
+    /// Folder with metadata.yaml, or one .mcap, .mcap.zstd, .db3 or .bag file.
     bag: PathBuf,
     /// Folder for the dataset.
     #[arg(long, value_name = "DIR", required_unless_present = "list")]
@@ -39,20 +40,23 @@ pub(crate) struct Arguments {
     /// the right wheel is then taken at the left wheel's instants.
     #[arg(long, value_name = "TOPIC[,TOPIC]", help_heading = "Topics")]
     wheels: Option<String>,
-    /// Topic of the poses of an outside instrument.
+    /// Topic of the poses of an outside instrument; none where the wheels and a gyro are all there is: then
+    /// neither poses nor scans are taken without their flags.
     #[arg(long, value_name = "TOPIC", help_heading = "Topics")]
     truth: Option<String>,
-    /// Topic of a lidar's scans (LaserScan), in place of poses or beside them: its straight walls become
+    /// Topic of a lidar's scans (LaserScan), in place of poses or with them: its straight walls become
     /// wall.csv. Taken by itself where it is the only one and the bag has no poses of an instrument. Where
-    /// the lidar stands is estimated, from where /tf_static has it.
+    /// the lidar is on the robot is estimated, starting from /tf_static.
     #[arg(long, value_name = "TOPIC", help_heading = "Topics")]
     scan: Option<String>,
     /// Topic of a gyroscope (Imu), if the bag's only one is not meant: its rates about the z axis of its
     /// frame, which is taken as up, become the column gyro_radps, their mean over the interval that ends at a
-    /// row.
+    /// row. none leaves the gyro out.
     #[arg(long, value_name = "TOPIC", help_heading = "Topics")]
     gyro: Option<String>,
-    /// Which transform is the robot's pose, where --truth is a topic of transforms.
+    /// Which transform is the robot's pose, where --truth is a topic of transforms: one of it, or the chain
+    /// of them and of those of /tf_static between the two frames. Where the wheels' own odometry is in the
+    /// chain, as in map to odom to base_link, only the corrections of the map are poses.
     #[arg(long, value_name = "PARENT,CHILD", value_parser = frames, help_heading = "Topics")]
     truth_frames: Option<(String, String)>,
     /// Definition of a message type that the bag itself does not define, as PACKAGE/msg/TYPE.msg or
@@ -101,6 +105,13 @@ fn frames(text: &str) -> Result<(String, String), String> {
     }
 }
 
+/// Of a gyro beside poses with headings.
+const GYRO_BESIDE_POSES: &str =
+    "the gyro is in the column gyro_radps; calibrate, check and diagnose use the poses and leave it out";
+
+/// Of a gyro that nobody named, beside poses without headings or walls.
+const GYRO_UNASKED: &str = "  also using the gyro; to ignore it, give --gyro none";
+
 #[derive(Serialize)]
 struct Document<'a> {
     format: &'static str,
@@ -137,12 +148,14 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
 }
 
 fn import(arguments: &Arguments, out: &Path, terminal: &Terminal) -> Result<(), Failure> {
+    let open = OpenBag::open(&arguments.bag, &arguments.definitions)?;
+    let stated = arguments.robot.stated_beside(open.robot_description())?;
+    stated.show(terminal)?;
     let as_question = |error: RosBagError| match &error {
         RosBagError::Dataset(missing) => with_command_line(missing).unwrap_or_else(|| error.into()),
         _ => error.into(),
     };
-    let FromBag { mut dataset, took, warnings } =
-        ros_bag::import(&arguments.bag, &arguments.options()?).map_err(as_question)?;
+    let FromBag { mut dataset, took, warnings } = open.import(&arguments.options(stated)).map_err(as_question)?;
     arguments.robot.identity.state_in(&mut dataset.provenance);
     let topics = [
         ("wheels", "--wheels", Some(&took.wheels)),
@@ -153,12 +166,13 @@ fn import(arguments: &Arguments, out: &Path, terminal: &Terminal) -> Result<(), 
     for (what, flag, topic) in topics {
         let Some(topic) = topic else { continue };
         let TookTopic { topic, type_name, what: of, quantity, rows, times } = topic;
-        terminal.say(&format!("{what}: {topic} ({type_name}), {of}, {quantity}, {rows} rows by {times} ({flag})"))?;
+        terminal.note(&format!("{what}: {topic} ({type_name}), {of}, {quantity}, {rows} rows by {times} ({flag})"))?;
     }
-    if took.gyro.is_some() && arguments.gyro.is_none() {
-        terminal.say(
-            "  the gyro was taken unasked and weighs in calibrate: to leave it out, delete the column gyro_radps of odometry.csv",
-        )?;
+    let has_headings = dataset.runs.iter().flat_map(|run| run.truth.iter()).any(|pose| pose.theta_rad().is_some());
+    match (&took.gyro, &arguments.gyro) {
+        (Some(_), _) if has_headings => terminal.note(GYRO_BESIDE_POSES)?,
+        (Some(_), None) if took.truth.is_some() || took.scan.is_some() => terminal.note(GYRO_UNASKED)?,
+        _ => {}
     }
     for warning in &warnings {
         terminal.remark(&format!("warning: {warning}"));
@@ -173,7 +187,7 @@ fn import(arguments: &Arguments, out: &Path, terminal: &Terminal) -> Result<(), 
     };
     let Written { dataset: out, runs, odometry_rows, truth_rows, wall_rows } = &written;
     let walls = if took.scan.is_some() { format!(", {wall_rows} readings of walls") } else { String::new() };
-    terminal.say(&format!("{runs} runs, {odometry_rows} odometry rows, {truth_rows} truth rows{walls} in {out}"))?;
+    terminal.note(&format!("{runs} runs, {odometry_rows} odometry rows, {truth_rows} truth rows{walls} in {out}"))?;
     terminal.document(&Document {
         format: "ros2",
         source: arguments.bag.display().to_string(),
@@ -184,8 +198,8 @@ fn import(arguments: &Arguments, out: &Path, terminal: &Terminal) -> Result<(), 
 }
 
 impl Arguments {
-    fn options(&self) -> Result<Options, Failure> {
-        Ok(Options {
+    fn options(&self, stated: Stated) -> Options {
+        Options {
             wheels: self.wheels.clone(),
             truth: self.truth.clone(),
             scan: self.scan.clone(),
@@ -201,8 +215,9 @@ impl Arguments {
             truth_frames: self.truth_frames.clone(),
             rates: self.rates,
             cut_s: self.cut,
-            robot: self.robot.given()?,
-        })
+            known_wheels: stated.joints,
+            robot: stated.given,
+        }
     }
 }
 
@@ -238,9 +253,10 @@ fn list(arguments: &Arguments, terminal: &Terminal) -> Result<(), Failure> {
     if let Some(command) = &command {
         terminal.say(&format!("to import it: {command}"))?;
     }
+    let has_no_reference = listing.truth.is_none() && listing.scan.is_none();
     let missing = [
         (listing.wheels.is_none(), "wheels of a known type"),
-        (listing.truth.is_none() && listing.scan.is_none(), "poses of an instrument"),
+        (has_no_reference && listing.gyro.is_none(), "poses of an instrument"),
     ];
     for (_, what) in missing.iter().filter(|(is_missing, _)| *is_missing) {
         terminal.say(&format!("no topic is plainly one of {what}; --help says how to name any other"))?;
@@ -255,7 +271,8 @@ fn list(arguments: &Arguments, terminal: &Terminal) -> Result<(), Failure> {
 
 /// The command line that imports the most plausible topics.
 fn command(arguments: &Arguments, listing: &Listing) -> Option<String> {
-    if listing.wheels.is_none() && listing.truth.is_none() && listing.scan.is_none() {
+    let has_reference = listing.truth.is_some() || listing.scan.is_some() || listing.gyro.is_some();
+    if listing.wheels.is_none() && !has_reference {
         return None;
     }
     let quoted = |name: &str| if name.contains(' ') { format!("'{name}'") } else { name.to_owned() };
@@ -264,11 +281,16 @@ fn command(arguments: &Arguments, listing: &Listing) -> Option<String> {
     let gyro = listing.gyro.as_deref().map(|topic| format!(" --gyro {}", quoted(topic))).unwrap_or_default();
     let reference = match (&listing.truth, &listing.scan) {
         (None, Some(scan)) => format!("--scan {}", quoted(scan)),
+        (None, None) if listing.gyro.is_some() => "--truth none".to_owned(),
         (truth, _) => format!("--truth {}", topic(truth)),
     };
     let ticks = if listing.is_counted { " --ticks-per-rev COUNTS" } else { "" };
+    let robot = match listing.robot_description {
+        Some(_) => "",
+        None => " --wheel DIAMETER_M --base SEPARATION_M",
+    };
     Some(format!(
-        "yair import ros2 {} --out DIR --wheels {} {reference}{gyro}{flags} --wheel DIAMETER_M --base SEPARATION_M{ticks}",
+        "yair import ros2 {} --out DIR --wheels {} {reference}{gyro}{flags}{robot}{ticks}",
         quoted(&arguments.bag.display().to_string()),
         topic(&listing.wheels),
     ))

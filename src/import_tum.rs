@@ -44,6 +44,6 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let Arguments { truths, wheels, odometry, out, force, reading } = arguments;
     let motion = if odometry.is_empty() { TumMotion::Wheels(wheels) } else { TumMotion::Odometry(odometry) };
     let sources = [&truths[..], wheels, odometry].concat();
-    let found = reading.identified(read_tum(truths, motion, &reading.options()?));
+    let found = reading.identified(read_tum(truths, motion, &reading.options(terminal)?));
     import_csv::write("tum", &sources, found, out, *force, terminal)
 }

@@ -17,7 +17,7 @@ pub(crate) enum Log {
 }
 
 impl Log {
-    /// Reads datasets; a folder of datasets stands for all of them.
+    /// Reads datasets; a folder of datasets means all of them.
     pub(crate) fn read(paths: &[PathBuf], terminal: &Terminal) -> Result<Self, Failure> {
         let Some(mut blocks) = blocks_at(paths)?.filter(|blocks| many_rows(blocks)) else {
             return Ok(Self::Whole(read_datasets(paths, terminal)?));

@@ -9,7 +9,7 @@ use crate::html_report::write_sweep;
 use crate::sweep_table;
 use crate::terminal::{Failure, Terminal};
 
-/// Put the shards of a sweep together; the result is that of one machine, to the bit.
+/// Merge the shards of a sweep; the result is that of one machine, to the bit.
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// The folders of all shards, in any order.

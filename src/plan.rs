@@ -16,8 +16,7 @@ use crate::plan_instruments::{Expected, expected, show as show_instruments};
 use crate::simulate::{refuse_filled, write_whole};
 use crate::terminal::{Failure, Terminal, advance, table};
 
-/// The next experiment: what discriminates the candidates that a diagnosis leaves, or shows what it could not
-/// see; from a scenario, what to drive before there is any data.
+/// Plan the next drive: one that separates the remaining causes, or shows what the data could not show.
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// Datasets of one robot, or a folder of them, or a scenario file.

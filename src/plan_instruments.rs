@@ -119,12 +119,11 @@ pub(crate) fn show(all: &[Expected], budget: Budget, terminal: &Terminal) -> Res
         budget.room_x_m, budget.room_y_m
     ))?;
     let mut rows = table(&["instrument", "runs", "min", "left %", "right %", "wheelbase %"], 1);
-    let keys = [Parameter::LeftWheelDiameter, Parameter::RightWheelDiameter, Parameter::WheelSeparation];
     for of in all {
         let percent = |parameter: Parameter| {
             of.relative.get(parameter.key()).map_or("–".to_owned(), |relative| format!("{:.4}", 100.0 * relative))
         };
-        let [left, right, base] = keys.map(percent);
+        let [left, right, base] = Parameter::LENGTHS.map(percent);
         rows.add_row([of.what.to_owned(), of.runs.to_string(), format!("{:.1}", of.minutes), left, right, base]);
     }
     terminal.say(&rows.to_string())?;

@@ -53,6 +53,9 @@ pub struct Report;
 #[doc = include_str!("../crates/report-page/README.md")]
 pub struct ReportPage;
 
+#[doc = include_str!("../crates/robot-files/README.md")]
+pub struct RobotFiles;
+
 #[doc = include_str!("../crates/ros-bag/README.md")]
 pub struct RosBag;
 

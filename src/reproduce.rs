@@ -12,7 +12,7 @@ use crate::new_folders::NewFolders;
 use crate::simulate::{refuse_filled, write_whole};
 use crate::terminal::{Failure, Terminal};
 
-/// The paper's tables from simulation, beside the published values, and where the paper contradicts itself.
+/// Reproduce the paper's tables by simulation, with the published values and their contradictions.
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// How often each experiment is repeated.

@@ -16,7 +16,7 @@ use crate::new_folders::NewFolders;
 use crate::session_identity::SessionIdentity;
 use crate::terminal::{Failure, Terminal};
 
-/// Run a scenario's protocols once; the dataset goes to DIR, the hidden truth beside it to DIR.truth.json.
+/// Simulate a scenario once: writes a dataset to DIR, and the hidden truth to DIR.truth.json.
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// Scenario file (TOML); see scenarios/.
@@ -30,7 +30,7 @@ pub(crate) struct Arguments {
     /// Which trial of the seed to run.
     #[arg(long, default_value_t = 0)]
     trial: u64,
-    /// Which point of the sweep's design to take, counted from 1; without it the scenario as it stands.
+    /// Which point of the sweep's design to take, counted from 1; without it the scenario as written.
     #[arg(long, value_name = "P")]
     point: Option<u32>,
     /// Drive what this method drives, where the sweep gives it protocols of its own.
@@ -88,7 +88,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         truth_rows: runs.iter().map(|run| run.truth.len()).sum(),
         point_rows: runs.iter().map(|run| run.point_readings.len()).sum(),
     };
-    terminal.say(&format!(
+    terminal.note(&format!(
         "{} runs, {} odometry rows, {} truth rows, {} point readings in {}\nhidden truth in {}",
         document.runs,
         document.odometry_rows,
@@ -101,7 +101,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     Ok(ExitCode::SUCCESS)
 }
 
-/// The trial that is asked for: of the scenario as it stands, or of a point of its sweep.
+/// The trial that is asked for: of the scenario as written, or of a point of its sweep.
 fn simulate(arguments: &Arguments, scenario: &Scenario, seed: u64) -> Result<Simulation, Failure> {
     let file = arguments.scenario.display();
     let (mut point, mut at) = (0, None);
@@ -133,6 +133,17 @@ fn simulate(arguments: &Arguments, scenario: &Scenario, seed: u64) -> Result<Sim
 /// Writes a dataset; where one stands in the way, says how it is replaced.
 pub(crate) fn write_dataset(dataset: &Dataset, dir: &Path, force: bool) -> Result<(), Failure> {
     dataset::write(dataset, dir, existing(force)).map_err(|error| say_how_to_replace(error, force))
+}
+
+/// As [`write_dataset`], of a dataset whose instrument's instants are shifted as it is read.
+pub(crate) fn write_shifted_dataset(
+    dataset: &Dataset,
+    dir: &Path,
+    force: bool,
+    truth_shift_s: Option<f64>,
+) -> Result<(), Failure> {
+    dataset::write_with_shift(dataset, dir, existing(force), truth_shift_s)
+        .map_err(|error| say_how_to_replace(error, force))
 }
 
 /// Begins a dataset that is written a run at a time; where one stands in the way, says how it is replaced.

@@ -16,7 +16,7 @@ use crate::shard::{ShardChoice, locked};
 use crate::terminal::{Failure, INTERRUPTED, Terminal, table};
 use crate::{sweep_summary, sweep_table};
 
-/// Monte-Carlo: bias, spread, coverage and efficiency of every method over a scenario's design.
+/// Sweep a scenario by Monte Carlo: bias, spread, coverage and efficiency of every method.
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// Scenario file (TOML) with a [sweep] section; see scenarios/.
@@ -130,7 +130,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         Outcome::Shard => {
             let out = out.unwrap_or(Path::new("."));
             terminal.remark(&format!(
-                "shard {shard} stands in {} after {elapsed_s:.1} s; yair merge puts the shards together",
+                "shard {shard} is in {} after {elapsed_s:.1} s; yair merge combines the shards",
                 out.display()
             ));
             Ok(ExitCode::SUCCESS)

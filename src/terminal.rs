@@ -9,10 +9,11 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use anstream::{AutoStream, ColorChoice};
 use anstyle::{AnsiColor, Effects, Style};
 use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
 use dataset::{Dataset, Warning};
-use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+use indicatif::{HumanCount, HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use serde::Serialize;
 
 use crate::plain_text::{printable, printable_json, printable_message};
@@ -35,6 +36,8 @@ pub(crate) struct Terminal {
     output: StandardOutput,
     signals: Arc<Signals>,
     transcript: Option<Transcript>,
+    /// The JSON document and the message of a failure: both are one document at the end.
+    answer: Mutex<(Option<String>, Option<String>)>,
 }
 
 /// What is kept for a calling program.
@@ -70,7 +73,7 @@ const TABLE_WIDTH: u16 = 100;
 
 impl Terminal {
     pub(crate) fn new(json: bool, quiet: bool, signals: Arc<Signals>) -> Self {
-        Self { json, quiet, output: StandardOutput::default(), signals, transcript: None }
+        Self { json, quiet, output: StandardOutput::default(), signals, transcript: None, answer: Mutex::default() }
     }
 
     /// Nothing is printed: [`Self::into_transcript`] has it.
@@ -104,6 +107,26 @@ impl Terminal {
         Ok(())
     }
 
+    /// What was written where, or read as what; nothing beside JSON, and when quiet.
+    pub(crate) fn note(&self, text: &str) -> Result<(), Failure> {
+        if self.quiet { Ok(()) } else { self.say(text) }
+    }
+
+    /// A result whose lines begin with how grave they are; where somebody watches, this word has a colour.
+    pub(crate) fn say_by_severity(&self, text: &str) -> Result<(), Failure> {
+        if self.json {
+            return Ok(());
+        }
+        let has_colours = AutoStream::choice(&std::io::stdout()) != ColorChoice::Never;
+        let coloured = |line: &str| match has_colours {
+            true => in_colour(line),
+            false => line.to_owned(),
+        };
+        let lines: Vec<String> = printable(text).lines().map(coloured).collect();
+        self.print(format!("{}\n", lines.join("\n")).as_bytes());
+        Ok(())
+    }
+
     /// Bytes on standard output as they are. Where they cannot be written, the command goes on, since files
     /// are results too, and [`Self::exit_code`] says so at its end.
     pub(crate) fn print(&self, text: &[u8]) {
@@ -112,6 +135,12 @@ impl Terminal {
 
     /// The exit code of a command that ended with `code`, and the message where its output is not all there.
     pub(crate) fn exit_code(&self, code: u8) -> u8 {
+        if self.json && self.transcript.is_none() && !self.signals.is_ending() {
+            let answer = self.answer.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some(text) = one_document(answer.0.as_deref(), answer.1.as_deref()) {
+                self.print(format!("{}\n", printable_json(&text)).as_bytes());
+            }
+        }
         match self.output.failed() {
             Some(why) if code != 1 => {
                 self.failure(&why);
@@ -127,7 +156,7 @@ impl Terminal {
             let text = serde_json::to_string_pretty(document)?;
             match &self.transcript {
                 Some(transcript) => transcript.printed().document = Some(text),
-                None => self.print(format!("{}\n", printable_json(&text)).as_bytes()),
+                None => self.answer.lock().unwrap_or_else(PoisonError::into_inner).0 = Some(text),
             }
         }
         Ok(())
@@ -159,6 +188,12 @@ impl Terminal {
             return;
         }
         let _ = writeln!(anstream::stderr(), "{ERROR}error{ERROR:#}: {message}");
+        self.answer.lock().unwrap_or_else(PoisonError::into_inner).1 = Some(message);
+    }
+
+    /// Bad usage, which clap has shown already: what `--json` says of it.
+    pub(crate) fn usage_error(&self, message: &str) {
+        self.answer.lock().unwrap_or_else(PoisonError::into_inner).1 = Some(printable_message(message).into_owned());
     }
 
     /// Progress over `total` steps with the time left: a bar where somebody watches, else a line now and
@@ -167,11 +202,8 @@ impl Terminal {
         if let Some(hidden) = self.hidden_progress(total, what) {
             return hidden;
         }
-        let template = if std::io::stderr().is_terminal() {
-            "{msg} {wide_bar} {human_pos}/{human_len}, {left}"
-        } else {
-            "{msg}: {human_pos} of {human_len}, {left}"
-        };
+        let template =
+            if std::io::stderr().is_terminal() { "{msg} {wide_bar} {count}, {left}" } else { "{msg}: {count}, {left}" };
         bar(total, template).with_message(what.to_owned())
     }
 
@@ -187,18 +219,50 @@ impl Terminal {
         })
     }
 
-    /// Progress of a few stages that take long each: what is done now, how much of the whole is done, and the
-    /// time left. [`advance`] says so.
+    /// Progress of a few stages that take long each: what is done now, and the time so far. What is left is
+    /// not forecast: how long a stage takes depends on the log. [`advance`] says what is done.
     pub(crate) fn stages(&self, what: &'static str) -> ProgressBar {
         if let Some(hidden) = self.hidden_progress(PARTS, what) {
             return hidden;
         }
         let template = if std::io::stderr().is_terminal() {
-            "{prefix} {wide_bar} {percent} %, {left}: {msg}"
+            "{prefix} {wide_bar} {sofar}: {msg}"
         } else {
-            "{prefix}: {percent} %, {left}: {msg}"
+            "{prefix}: {sofar}: {msg}"
         };
         bar(PARTS, template).with_prefix(what)
+    }
+}
+
+/// A document with the message of a failure as its first key; `None` where there is neither.
+pub(crate) fn one_document(document: Option<&str>, error: Option<&str>) -> Option<String> {
+    let key = error.map(|error| format!("\"error\": {}", serde_json::Value::from(error)));
+    match (document, key) {
+        (Some(document), Some(key)) => {
+            let rest = document.strip_prefix('{').map(str::trim_start);
+            Some(match rest {
+                Some("}") | None => format!("{{\n  {key}\n}}"),
+                Some(rest) => format!("{{\n  {key},\n  {rest}"),
+            })
+        }
+        (Some(document), None) => Some(document.to_owned()),
+        (None, key) => key.map(|key| format!("{{\n  {key}\n}}")),
+    }
+}
+
+/// A line with its first word in the colour of a severity, where it is one.
+fn in_colour(line: &str) -> String {
+    let styles = [("error", ERROR), ("warning", WARNING), ("hint", HINT)];
+    let start = line.len() - line.trim_start().len();
+    let found = styles.iter().find(|(word, _)| {
+        let rest = line[start..].strip_prefix(word);
+        rest.is_some_and(|rest| rest.starts_with([' ', ':']))
+    });
+    match found {
+        Some((word, style)) => {
+            format!("{}{style}{word}{style:#}{}", &line[..start], &line[start + word.len()..])
+        }
+        None => line.to_owned(),
     }
 }
 
@@ -219,10 +283,20 @@ fn bar(total: u64, template: &str) -> ProgressBar {
         ProgressDrawTarget::term_like_with_hz(Box::new(SparseLines::new()), 1)
     };
     let bar = ProgressBar::with_draw_target(Some(total), target);
-    let left = |state: &ProgressState, text: &mut dyn fmt::Write| {
+    let count = |state: &ProgressState, text: &mut dyn fmt::Write| {
+        let _ = match state.len() {
+            // How many there are is not known before the first ones are done.
+            None | Some(0) => text.write_str("the first ones"),
+            Some(all) => write!(text, "{} of {}", HumanCount(state.pos()), HumanCount(all)),
+        };
+    };
+    let so_far = |state: &ProgressState, text: &mut dyn fmt::Write| {
+        let _ = write!(text, "{} so far", HumanDuration(state.elapsed()));
+    };
+    let left = move |state: &ProgressState, text: &mut dyn fmt::Write| {
         // Before the first step nobody knows.
         let _ = match state.pos() {
-            0 => write!(text, "{} so far", HumanDuration(state.elapsed())),
+            0 => return so_far(state, text),
             // By the mean pace so far: what the last steps took says nothing where one takes long.
             done => {
                 let to_do = state.len().unwrap_or(done).saturating_sub(done) as f64;
@@ -231,7 +305,7 @@ fn bar(total: u64, template: &str) -> ProgressBar {
         };
     };
     if let Ok(style) = ProgressStyle::with_template(template) {
-        bar.set_style(style.with_key("left", left));
+        bar.set_style(style.with_key("count", count).with_key("left", left).with_key("sofar", so_far));
     }
     bar.enable_steady_tick(Duration::from_secs(1));
     bar
@@ -240,6 +314,7 @@ fn bar(total: u64, template: &str) -> ProgressBar {
 /// Colours of what stands before a message; `anstream` drops them where nobody watches or NO_COLOR is set.
 const ERROR: Style = AnsiColor::Red.on_default().effects(Effects::BOLD);
 const WARNING: Style = AnsiColor::Yellow.on_default().effects(Effects::BOLD);
+const HINT: Style = AnsiColor::Cyan.on_default();
 
 /// What the system says of a mistaken path, as a person would: every reader of files ends here.
 fn in_plain_words(message: &str) -> String {
@@ -269,7 +344,7 @@ pub(crate) fn table(headers: &[&str], left: usize) -> Table {
     table
 }
 
-/// Reads datasets and passes their warnings on; a folder of datasets stands for all of them.
+/// Reads datasets and passes their warnings on; a folder of datasets means all of them.
 pub(crate) fn read_datasets(paths: &[PathBuf], terminal: &Terminal) -> Result<Vec<Dataset>, Failure> {
     let paths = datasets_at(paths)?;
     let bar = terminal.stages("reading");
@@ -278,6 +353,11 @@ pub(crate) fn read_datasets(paths: &[PathBuf], terminal: &Terminal) -> Result<Ve
         let loaded = dataset::read(path)?;
         bar.suspend(|| warn(path, &loaded.warnings, terminal));
         let mut dataset = loaded.dataset;
+        let runs = dataset.leave_out_gyros_beside_poses();
+        if runs > 0 {
+            let what = "poses with headings say more, and calibrate, check and diagnose leave the gyro out";
+            bar.suspend(|| terminal.remark(&format!("{}: the gyro of {runs} runs: {what}", path.display())));
+        }
         dataset.provenance.name.get_or_insert_with(|| folder_name(path));
         Ok(dataset)
     };
@@ -291,21 +371,27 @@ pub(crate) fn is_dataset(path: &Path) -> bool {
     path.join("dataset.toml").exists()
 }
 
-/// What to do with a file where a dataset, which is a folder, belongs.
-fn not_imported(path: &Path) -> String {
+/// The command that imports a file, by its ending.
+pub(crate) fn import_command(path: &Path) -> String {
     let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_lowercase();
-    let (format, robot) = match &ending[..] {
-        "toml" => return format!("{}: it is a file; a dataset is the folder of a dataset.toml", path.display()),
-        "mcap" | "db3" => ("ros2", " --wheel METRES --base METRES"),
+    let (format, more) = match &ending[..] {
+        "mcap" | "db3" | "bag" | "zstd" => ("ros2", " --wheel METRES --base METRES"),
         "tuple" => ("censi", ""),
         "tum" => ("tum", " --odometry FILE --wheel METRES --base METRES"),
+        _ if path.is_dir() => ("ros2", " --wheel METRES --base METRES"),
         _ => ("csv", " --wheel METRES --base METRES"),
     };
-    let (place, out) = (path.display(), path.with_extension(""));
-    format!(
-        "{place}: it is a file, and no dataset; import it first: yair import {format} {place} --out {}{robot}",
-        out.display()
-    )
+    let out = path.file_stem().map_or_else(|| "mine".to_owned(), |stem| stem.to_string_lossy().into_owned());
+    format!("yair import {format} {} --out {out}{more}", path.display())
+}
+
+/// What to do with a file where a dataset, which is a folder, belongs.
+fn not_imported(path: &Path) -> String {
+    let place = path.display();
+    if path.extension().is_some_and(|ending| ending == "toml") {
+        return format!("{place}: it is a file; a dataset is the folder of a dataset.toml");
+    }
+    format!("{place}: it is a file, and no dataset; import it first: {}", import_command(path))
 }
 
 /// A dataset, or those in a folder of datasets, by name.
@@ -375,4 +461,31 @@ pub(crate) fn listed_ids<'a>(ids: impl Iterator<Item = &'a str>) -> String {
     let all: Vec<&str> = ids.collect();
     let more = if all.len() > SHOWN_RUNS { ", …" } else { "" };
     all[..all.len().min(SHOWN_RUNS)].join(", ") + more
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_document_and_a_failure_are_one_document() {
+        let of = |document: Option<&str>, error: Option<&str>| {
+            one_document(document, error).map(|text| serde_json::from_str::<serde_json::Value>(&text).expect("JSON"))
+        };
+        let json = |text: &str| serde_json::from_str(text).ok();
+        assert_eq!(of(None, None), None);
+        assert_eq!(of(Some("{\n  \"a\": 1\n}"), None), json("{\"a\": 1}"));
+        assert_eq!(of(None, Some("x \"y\"\n")), json("{\"error\": \"x \\\"y\\\"\\n\"}"));
+        assert_eq!(of(Some("{\n  \"a\": {}\n}"), Some("x")), json("{\"error\": \"x\", \"a\": {}}"));
+        assert_eq!(of(Some("{}"), Some("x")), json("{\"error\": \"x\"}"));
+    }
+
+    #[test]
+    fn the_first_word_of_a_line_has_the_colour_of_its_severity() {
+        assert_eq!(in_colour(" error  a"), format!(" {ERROR}error{ERROR:#}  a"));
+        assert_eq!(in_colour("hint: b"), format!("{HINT}hint{HINT:#}: b"));
+        for line in ["errors", " severity  problem", "", "─────", "an error"] {
+            assert_eq!(in_colour(line), line);
+        }
+    }
 }

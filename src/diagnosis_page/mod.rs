@@ -151,7 +151,7 @@ impl Page<'_> {
         if !standing.is_empty() {
             writeln!(
                 page,
-                "Each effect alone beside the calibration, before any other is in the model: its significance, and its log odds against the best, to second order.\n"
+                "Each effect alone with the calibration, before any other is in the model: its significance, and its log odds against the best, to second order.\n"
             )?;
             writeln!(page, "| effect | z | log odds against the best | outcome |\n| --- | --- | --- | --- |")?;
             for alternative in standing.iter().take(MAX_ALTERNATIVES) {

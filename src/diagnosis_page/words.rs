@@ -1,20 +1,123 @@
 //! Findings and checks in words that a roboticist uses.
 
-use diagnose::{Check, Compared, Document, Finding, Value, Verdict};
-use effects::{Estimate, Estimates};
+use diagnose::{Check, Compared, Document, Finding, UnlistedTerm, Value, Verdict};
+use effects::{Estimate, Estimates, OnBoard, Statement};
 
 /// What a finding's first name means, with its sizes; the finding's own sentence where that says more.
 pub(crate) fn meaning(finding: &Finding) -> String {
     meaning_of_first(finding).unwrap_or_else(|| finding.sentence.clone())
 }
 
-/// What a finding's first name means, with its sizes, where the catalogue says it.
+/// What a finding's first name means, with its sizes, where the catalogue or the term says it.
 fn meaning_of_first(finding: &Finding) -> Option<String> {
+    match (&finding.unlisted_term, statement(finding)) {
+        (Some(term), _) => Some(format!("{}, which is not in the catalogue", term_in_words(term))),
+        (None, statement) => statement.map(|of| of.sentence()),
+    }
+}
+
+fn statement(finding: &Finding) -> Option<Statement> {
     let estimate = |value: &Value| Estimate { value: value.value, sigma: value.sigma };
     let sizes: Estimates<'_> =
         finding.parameters.iter().map(|(name, value)| (name.as_str(), estimate(value))).collect();
-    let description = effects::description(&finding.id);
-    description.and_then(|of| of.with_values(&sizes))
+    effects::description(&finding.id)?.statement(&sizes)
+}
+
+/// What is wrong, without its size.
+pub(crate) fn cause(finding: &Finding) -> &'static str {
+    let of_catalogue = || effects::description(&finding.id).map(|of| of.meaning);
+    statement(finding).map(|of| of.what).or_else(of_catalogue).unwrap_or("something that is not in the catalogue")
+}
+
+/// What is wrong as a part of a sentence, without its size and without identifiers.
+pub(crate) fn cause_in_a_sentence(finding: &Finding) -> String {
+    match &finding.unlisted_term {
+        Some(term) => format!("{}, which is not in the catalogue", term_in_words(term)),
+        None if effects::description(&finding.id).is_none() => {
+            "the residuals show something that no known cause explains".to_owned()
+        }
+        // A fault of the records says in its own sentence what was undone.
+        None if statement(finding).is_none() && !finding.sentence.contains('_') => {
+            finding.sentence.trim_end_matches('.').to_owned()
+        }
+        None => cause(finding).to_owned(),
+    }
+}
+
+/// How large it is; `None` where nothing has a size that people can picture.
+pub(crate) fn size(finding: &Finding) -> Option<String> {
+    statement(finding)?.size
+}
+
+/// Whether the first cause is a fault of the instrument, its clock or its mounting.
+pub(crate) fn is_of_instrument(finding: &Finding) -> bool {
+    effects::description(&finding.id).is_some_and(|of| matches!(of.on_board, OnBoard::OfInstrument))
+}
+
+/// An effect outside of the catalogue: what it does, and in proportion to what.
+fn term_in_words(term: &UnlistedTerm) -> String {
+    let signed = |positive: &'static str, negative| if term.coefficient < 0.0 { negative } else { positive };
+    let what = match &term.channel[..] {
+        "along" => signed("the robot gains distance", "the robot loses distance"),
+        "across" => signed("the robot drifts to the left", "the robot drifts to the right"),
+        "yaw" => signed("the robot turns too far to the left", "the robot turns too far to the right"),
+        "wheels" => signed("both wheels gain distance", "both wheels lose distance"),
+        "left_wheel" => signed("the left wheel gains distance", "the left wheel loses distance"),
+        "right_wheel" => signed("the right wheel gains distance", "the right wheel loses distance"),
+        "seen_along" => signed("the instrument sees the robot ahead", "the instrument sees the robot behind"),
+        "seen_across" => {
+            signed("the instrument sees the robot on the left", "the instrument sees the robot on the right")
+        }
+        "seen_heading" => {
+            signed("the instrument sees the robot turned left", "the instrument sees the robot turned right")
+        }
+        _ => signed("the instrument is late", "the instrument is early"),
+    };
+    let product: Vec<&str> = term.covariates.iter().filter(|name| *name != "1").map(|name| covariate(name)).collect();
+    if product.is_empty() {
+        format!("{what} all the time")
+    } else {
+        format!("{what} in proportion to {}", product.join(" × "))
+    }
+}
+
+/// A covariate by the words of a roboticist.
+fn covariate(name: &str) -> &str {
+    match name {
+        "v" => "speed",
+        "|v|" => "the size of the speed",
+        "omega" => "yaw rate",
+        "|omega|" => "the size of the yaw rate",
+        "yaw_acceleration" => "yaw acceleration",
+        "wheel v" => "wheel speed",
+        "|wheel v|" => "the size of the wheel speed",
+        "wheel sense" => "the sense of rotation of the wheel",
+        "exp(-|wheel v| / 0.05 m/s)" => "slowness of the wheel",
+        "exp(-wheel distance since reversal / 2 mm)" => "nearness to the last reversal of the wheel",
+        "row length" => "the time between rows",
+        "cos(theta)" => "the cosine of the heading",
+        "sin(theta)" => "the sine of the heading",
+        "time in run" => "time in the run",
+        "session time" => "time in the session",
+        "distance driven" => "the distance driven",
+        "exp(-distance since reversal / 0.1 m)" => "nearness to the last reversal",
+        "bend" => "curvature",
+        "last turn" => "the sense of the last turn",
+        "x" => "x in the room",
+        "y" => "y in the room",
+        other => other,
+    }
+}
+
+/// Causes in words, the first three of them.
+pub(crate) fn in_words(ids: &[String]) -> String {
+    const MOST: usize = 3;
+    let word = |id: &String| effects::description(id).map_or("something that is not in the catalogue", |of| of.meaning);
+    let mut words: Vec<String> = ids.iter().take(MOST).map(|id| word(id).to_owned()).collect();
+    if ids.len() > MOST {
+        words.push(format!("{} more, listed below", ids.len() - MOST));
+    }
+    words.join("; ")
 }
 
 /// The verdict in a sentence.
@@ -28,7 +131,7 @@ pub(crate) fn verdict(document: &Document) -> String {
         .iter()
         .map(|finding| match (meaning_of_first(finding), &finding.names[..]) {
             (Some(first), [_, others @ ..]) if !others.is_empty() => {
-                format!("{first} – or it is {}, which these data do not discriminate", named(others))
+                format!("{first}; these data cannot tell it apart from {}", named(others))
             }
             // A sentence names all causes itself.
             (first, _) => first.unwrap_or_else(|| finding.sentence.clone()),
@@ -44,16 +147,14 @@ pub(crate) fn gain(document: &Document) -> Option<String> {
     let (share, half) = (100.0 * (base - extended) / base, 50.0 * (high - low) / base);
     let becomes = format!("{base:.3} % of the distance becomes {extended:.3} %");
     Some(if low > 0.0 {
-        format!(
-            "On runs that it was not fitted to, the extended model removes {share:.0} ± {half:.0} % of the drift (95 %): {becomes}."
-        )
+        format!("On held-out runs, the extended model removes {share:.0} ± {half:.0} % of the drift (95 %): {becomes}.")
     } else if high < 0.0 {
         format!(
-            "On runs that it was not fitted to, dead reckoning drifts more with the extended model: {becomes}. It explains what the instrument measured, and is not to be used for odometry."
+            "On held-out runs, dead reckoning drifts more with the extended model: {becomes}. Do not use it for odometry."
         )
     } else {
         format!(
-            "On runs that it was not fitted to, no change in the drift can be told: {becomes}; {}.",
+            "On held-out runs, the extended model makes no measurable difference to the drift: {becomes} ({}).",
             undecided(100.0 * low / base, 100.0 * high / base)
         )
     })
@@ -62,11 +163,7 @@ pub(crate) fn gain(document: &Document) -> Option<String> {
 /// An interval of the gain that contains zero, per cent of the drift. A normal interval may reach beyond all
 /// of the drift, of which nothing can be removed.
 pub(crate) fn undecided(low_percent: f64, high_percent: f64) -> String {
-    format!(
-        "with the correction it may be anything from {:.0} % less to {:.0} % more (95 %)",
-        high_percent.clamp(0.0, 100.0),
-        (-low_percent).max(0.0)
-    )
+    format!("95 % interval: {:.0} % less to {:.0} % more", high_percent.clamp(0.0, 100.0), (-low_percent).max(0.0))
 }
 
 /// Further names of a finding.

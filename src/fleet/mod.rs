@@ -21,7 +21,7 @@ use crate::simulate::write_whole;
 use crate::terminal::{Failure, INTERRUPTED, Terminal, is_dataset, refuse_doubles};
 use store::SessionStore;
 
-/// Many robots and their sessions: drift, parameters, findings, what changed, and whom to service first.
+/// Watch many robots: drift, parameters, findings, changes, and which robot to service first.
 ///
 /// Datasets with the same `[robot] id` are sessions of one robot, in the order of `recorded`; a dataset
 /// without an id is a robot of its own. A dataset that fails is listed and stops no other; the exit code is
@@ -139,8 +139,10 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         count => {
             let first = &fleet.failed[0];
             let what = format!("{count} of {} datasets failed", datasets.len());
-            terminal
-                .remark(&format!("error: {what}, the others stand; the first is {}: {}", first.dataset, first.error));
+            terminal.remark(&format!(
+                "error: {what}, the others are complete; the first is {}: {}",
+                first.dataset, first.error
+            ));
             Ok(ExitCode::FAILURE)
         }
     }

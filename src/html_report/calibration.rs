@@ -23,29 +23,12 @@ fn tile(label: &str, value: String, note: &str, section: &str) -> Tile {
     Tile { label: label.to_owned(), value, note: note.to_owned(), section: section.to_owned() }
 }
 
-/// Drift of the nominal robot and under one of the calibrations.
-fn drift_tile(under: &UnderCalibrations, shown: usize) -> Tile {
-    let chosen = under.drifts.get(shown).or_else(|| under.drifts.last());
-    let percent =
-        |drift: Option<&(String, Role, calib::CalibrationDrift)>| drift.and_then(|(_, _, of)| of.drift_percent);
-    let value = match (percent(under.drifts.first()), percent(chosen)) {
-        (Some(first), Some(last)) if under.drifts.len() > 1 => format!("{first:.3} % → {last:.3} %"),
-        (Some(first), _) => format!("{first:.3} %"),
-        _ => "Not measured".to_owned(),
-    };
-    let last = chosen.map_or("", |(name, ..)| name.as_str());
-    let note = if under.drifts.len() > 1 {
-        format!("of the distance, nominal → {last}")
-    } else {
-        "of the distance".to_owned()
-    };
-    tile("Drift on these runs", value, &note, "drift")
-}
-
 /// The sections that all of these pages end with.
-fn path_and_drift(under: &UnderCalibrations) -> [Section; 2] {
+fn path_and_drift(under: &mut UnderCalibrations) -> [Section; 2] {
     let drift = Section { blocks: drift::blocks(&under.drifts), ..Section::new("drift", "How far runs drift") };
-    [Section::new("path", "The path").with(under.path_block()), drift]
+    let mut path = Section::new("path", "The path").with(under.path_block());
+    path.blocks.extend(under.errors_block());
+    [path, drift]
 }
 
 /// The page of a calibration.
@@ -68,8 +51,11 @@ impl CalibrationPage<'_> {
             let name = calibration.calibration.name.clone();
             all.push(Under { name, role, calibration: Some(calibration), model: None });
         }
-        let under = UnderCalibrations::of(self.datasets, &all);
-        super::write(&self.page(&under), out)
+        let mut under = UnderCalibrations::of(self.datasets, &all);
+        let driven = under.driven_section();
+        let mut page = self.page(&mut under);
+        page.sections.push(driven);
+        super::write(&page, out)
     }
 
     /// The method of the first screen: the default one, or else the first that gave something.
@@ -79,7 +65,7 @@ impl CalibrationPage<'_> {
         default.or_else(|| given.next())
     }
 
-    fn page(&self, under: &UnderCalibrations) -> Report {
+    fn page(&self, under: &mut UnderCalibrations) -> Report {
         let mut section = Section::new("parameters", "The robot's parameters");
         for method in &self.report.methods {
             section = self.method(section, method);
@@ -93,7 +79,7 @@ impl CalibrationPage<'_> {
             ("Right wheel", &["right_wheel_diameter_m", "right_m_per_tick"]),
             ("Wheel separation", &["wheel_separation_m"]),
         ];
-        let mut tiles: Vec<Tile> = known
+        let tiles: Vec<Tile> = known
             .iter()
             .filter_map(|(label, keys)| {
                 let (key, value) = key_of(&first?, keys)?;
@@ -106,8 +92,6 @@ impl CalibrationPage<'_> {
                 Some(tile(label, shown, &format!("{stated}± is one standard deviation"), "parameters"))
             })
             .collect();
-        // The method of the other tiles stands behind the nominal values.
-        tiles.push(drift_tile(under, 1));
         let used = first.map_or(0, |method| method.runs_used);
         let fine = first.is_some_and(|method| method.converged && method.warnings.is_empty());
         let mut sections = vec![section];
@@ -121,6 +105,10 @@ impl CalibrationPage<'_> {
             headline: format!("The robot's wheels and their separation, from {}.", count(used, "run")),
             lead: "What the odometry is to use in place of the nominal values, and how far it drifts with both."
                 .to_owned(),
+            bars: drift::bars(
+                &under.drifts,
+                "Drift on the runs that were calibrated with: new runs drift a little more.",
+            ),
             tiles,
             sections,
             appendix: Vec::new(),
@@ -133,10 +121,10 @@ impl CalibrationPage<'_> {
         if let Some(error) = &method.error {
             return section.with(Block::Warning(format!("{name} gives nothing: {error}")));
         }
-        let caption = format!("By the method {name}, in SI units");
+        let caption = format!("By the method {name}");
         let mut section = section
             .with(parameters(&caption, &method.parameters, |key| nominal_value(self.robot, key)))
-            .with(Block::Code(format!("Parameters to copy ({name})"), to_copy(&method.parameters)));
+            .with(Block::Code(format!("Parameters to copy, in SI units ({name})"), to_copy(&method.parameters)));
         for warning in &method.warnings {
             section = section.with(Block::Warning(format!("{name}: {warning}")));
         }
@@ -165,16 +153,18 @@ impl EvaluationPage<'_> {
             let name = calibration.calibration.name.clone();
             all.push(Under { name, role, calibration: Some(calibration), model: given.model() });
         }
-        let under = UnderCalibrations::of(self.datasets, &all);
+        let mut under = UnderCalibrations::of(self.datasets, &all);
+        let driven = under.driven_section();
         let runs = run_names(self.datasets).len();
-        let mut tiles = vec![drift_tile(&under, under.drifts.len())];
+        let mut tiles = Vec::new();
         if let Some((name, _, last)) = under.drifts.last() {
             let millimetres = |length_m| format!("{} mm", of_millimetres(length_m));
             tiles.push(tile("Mean error at the end", millimetres(last.mean_final_position_m), name, "drift"));
             tiles.push(tile("Largest error anywhere", millimetres(last.max_position_m), name, "path"));
         }
         tiles.push(tile("Runs", runs.to_string(), "dead-reckoned from where they were first measured", "path"));
-        let mut sections = path_and_drift(&under).to_vec();
+        let mut sections = path_and_drift(&mut under).to_vec();
+        sections.push(driven);
         if shown.len() < given.len() {
             sections[0] = sections[0].clone().text(format!("Only the last {} calibrations are drawn.", shown.len()));
         }
@@ -184,6 +174,7 @@ impl EvaluationPage<'_> {
             tone: Tone::Neutral,
             headline: format!("How far the odometry drifts on {}.", count(runs, "run")),
             lead: "Drift is how far from the measured position a run ends, as a share of the distance.".to_owned(),
+            bars: drift::bars(&under.drifts, ""),
             tiles,
             sections,
             appendix: Vec::new(),
@@ -226,16 +217,14 @@ fn standings(comparison: &Comparison) -> Vec<(f64, usize, &str)> {
 fn headline(standings: &[(f64, usize, &str)]) -> String {
     let nominal = standings.iter().find(|(_, _, method)| *method == "nominal");
     match (standings.first(), nominal) {
-        (Some((_, _, "nominal")), _) => {
-            "No method beats the nominal values on sessions that it has not seen.".to_owned()
-        }
+        (Some((_, _, "nominal")), _) => "No method beats the nominal values on other sessions.".to_owned(),
         (Some((best_m, _, method)), Some((nominal_m, ..))) => format!(
             "Calibrate with {method}: runs of other sessions then end {:.1} mm from the truth on average; with the nominal values it is {:.1} mm.",
             1e3 * best_m,
             1e3 * nominal_m
         ),
         (Some((best_m, _, method)), None) => {
-            format!("{method} carries over best: runs of other sessions end {:.1} mm from the truth.", 1e3 * best_m)
+            format!("{method} predicts other sessions best: their runs end {:.1} mm from the truth.", 1e3 * best_m)
         }
         (None, _) => "No session says how far another's calibration drifts on it.".to_owned(),
     }
@@ -244,7 +233,7 @@ fn headline(standings: &[(f64, usize, &str)]) -> String {
 /// The page of a comparison of methods across sessions.
 pub(crate) fn write_comparison(comparison: &Comparison, datasets: &[Dataset], out: &Path) -> Result<(), Failure> {
     let mut table = Table::new(
-        "Mean error at the ends of runs that the calibration has not seen",
+        "Mean error at the ends of runs that the calibration was not fitted to",
         &["trained on", "method", "evaluated on", "position, mm", "heading, °", "pairs of sessions"],
     );
     for method in &comparison.methods {
@@ -295,6 +284,7 @@ pub(crate) fn write_comparison(comparison: &Comparison, datasets: &[Dataset], ou
         tone: Tone::Neutral,
         headline: headline(&standings),
         lead: "Every method calibrates on each session and is tested on every other: how far, on average, runs end from the measured position. Lower is better.".to_owned() + few,
+        bars: None,
         tiles,
         sections: vec![Section::new("table", "Errors by method and kind of path").with(Block::Table(table))],
         appendix: Vec::new(),

@@ -9,7 +9,7 @@ use report_page::{Block, Cell, Report, Section, Table, Tile, Tone};
 
 use super::diagnosis_details::limits_table;
 use super::words::count;
-use super::{made_by, markdown, next_drive};
+use super::{made_by, markdown, next_drive, sweep_charts};
 use crate::terminal::Failure;
 
 /// A page of numbers without a judgement.
@@ -20,6 +20,7 @@ fn page(command: &str, subject: String, headline: String, lead: &str) -> Report 
         tone: Tone::Neutral,
         headline,
         lead: lead.to_owned(),
+        bars: None,
         tiles: Vec::new(),
         sections: Vec::new(),
         appendix: Vec::new(),
@@ -64,13 +65,10 @@ pub(crate) fn write_sweep(result: &SweepResult, out: &Path) -> Result<(), Failur
     page.made_by.command_line =
         format!("scenario {}, seed {}, {} trials a point", result.scenario, result.seed, result.trials);
     // A sweep without an axis has no picture.
-    if let Ok(svg) = std::fs::read_to_string(out.join("sweep.svg")) {
-        let picture = Block::Svg(
-            "Bias, spread, efficiency and coverage of every method against each axis; the table below has the numbers"
-                .to_owned(),
-            svg,
-        );
-        page.sections.push(Section::new("picture", "At a glance").with(picture));
+    if let Some(figure) = ::bench::sweep_figure(result) {
+        let section = Section::new("picture", "At a glance").text(figure.caption_text());
+        let charts = figure.panels().iter().map(sweep_charts::chart).collect();
+        page.sections.push(section.with(Block::Charts(charts)));
     }
     page.sections.push(Section::new("table", "Every point").with(Block::Table(sweep_table(result))));
     super::write(&page, out)
@@ -110,7 +108,7 @@ fn sweep_table(result: &SweepResult) -> Table {
 /// The page of the paper's reproduction: its Markdown with its figures.
 pub(crate) fn write_reproduction(reproduction: &Reproduction, markdown: &str, out: &Path) -> Result<(), Failure> {
     const IDS: [&str; 8] = ["summary", "part-1", "part-2", "part-3", "part-4", "part-5", "part-6", "part-7"];
-    let headline = "The paper's tables and figures from simulation, beside the published values.";
+    let headline = "The paper's tables and figures from simulation, with the published values.";
     let mut page = page("yair reproduce", "Navarro, Benet, Ríos, Bueno".to_owned(), headline.to_owned(), "");
     page.sections = markdown::sections(markdown, &IDS, "Summary");
     let mut figures = Section::new("figures", "Figures");

@@ -23,7 +23,7 @@ pub(super) fn alternatives(alternatives: &[Alternative], document: &Document) ->
     for finding in document.findings.iter().filter(|finding| finding.names.len() > 1) {
         let names: Vec<String> = finding.names.iter().map(|id| format!("{id} ({})", meaning(id))).collect();
         section = section
-            .text("These data do not tell the following causes apart; the most probable stands first.")
+            .text("These data cannot tell the following causes apart; the most probable is first.")
             .with(Block::List(names));
     }
     if standing.is_empty() && others.is_empty() {
@@ -31,7 +31,7 @@ pub(super) fn alternatives(alternatives: &[Alternative], document: &Document) ->
     }
     if !standing.is_empty() {
         let headings = ["what it is", "cause", "z", "log odds against the best", "outcome"];
-        let mut table = Table::new("Causes that stand out when each is tried alone", &headings);
+        let mut table = Table::new("Causes that are significant when each is tried alone", &headings);
         for alternative in standing {
             table.row([
                 Cell::text(meaning(&alternative.id)),
@@ -81,7 +81,10 @@ fn sizes_by(units: &BTreeMap<String, BTreeMap<String, Value>>, id: &str, what: &
         units.values().flat_map(|sizes| sizes.iter().map(|(name, value)| (name, value.unit.as_str()))).collect();
     names.sort_unstable();
     names.dedup();
-    let mut table = Table::new(&format!("Sizes of {id} by {what}"), &[what]);
+    let mut table = Table::new(
+        &format!("Sizes of {id} by {what}: each one's own estimate, in the proportions found in all together"),
+        &[what],
+    );
     let heading = |(name, unit): &(&String, &str)| {
         if matches!(*unit, "1" | "") { (*name).clone() } else { format!("{name}, {unit}") }
     };
@@ -125,24 +128,34 @@ pub(super) fn limits_table(blind: &[Blind]) -> Table {
 pub(super) fn limits(document: &Document) -> Section {
     let section = Section::new("limits", "What these data cannot show");
     let blind = &document.blind_to;
-    let section = if blind.is_empty() {
+    if blind.is_empty() {
         section.text(
-            "Every known cause that these motions excite would have shown at a size that is large for a real robot.",
+            "Every known cause that these motions excite would have been detected at a size that is large for a real robot.",
         )
     } else {
-        section.with(Block::Table(limits_table(blind)))
-    };
-    let shown = document.sensitivity.iter().filter(|of| of.smallest_detectable.is_some());
-    let shown: Vec<&Blind> = shown.filter(|of| blind.iter().all(|blind| blind.id != of.id)).collect();
-    if shown.is_empty() {
-        return section;
+        section
+            .with(Block::Table(limits_table(blind)))
+            .text("Sizes: detected with a probability of 0.9, at a false-positive rate of 1e-3.")
     }
+}
+
+/// Causes that would have been detected, and from which size on.
+fn sensitivity(document: &Document) -> Option<Section> {
+    let blind = &document.blind_to;
     let found = |id: &str| document.findings.iter().any(|finding| finding.id == id);
-    let mut table = Table::new("Causes that would have shown", &["what it is", "cause", "from this size on"]);
-    for of in shown.into_iter().filter(|of| !found(&of.id)) {
+    let shown = document.sensitivity.iter().filter(|of| of.smallest_detectable.is_some());
+    let shown: Vec<&Blind> = shown.filter(|of| blind.iter().all(|blind| blind.id != of.id) && !found(&of.id)).collect();
+    if shown.is_empty() {
+        return None;
+    }
+    let mut table = Table::new(
+        "Detected with a probability of 0.9, at a false-positive rate of 1e-3",
+        &["what it is", "cause", "from this size on"],
+    );
+    for of in shown {
         table.row([Cell::text(meaning(&of.id)), Cell::id(of.id.clone()), Cell::text(limit(of))]);
     }
-    section.with(Block::Table(table)).text("Limits: seen with a probability of 0.9, at a false-positive rate of 1e-3.")
+    Some(Section::new("sensitivity", "Causes that would have been detected").with(Block::Table(table)))
 }
 
 /// What is closed at first.
@@ -150,7 +163,8 @@ pub(super) fn appendix(document: &Document, found: &Residuals, extended: bool) -
     let mut appendix = Vec::new();
     let failed = document.checks.iter().filter(|check| !check.passes).count();
     let title = format!("Checks of the residuals: {failed} of {} fail", document.checks.len());
-    let mut checks = Table::new("At 1 % for all together (Holm)", &["question", "answer", "statistic", "p-value"]);
+    let level = format!("At {} % for all together (Holm)", 100.0 * ::diagnose::CHECKS_LEVEL);
+    let mut checks = Table::new(&level, &["question", "answer", "statistic", "p-value"]);
     for check in &document.checks {
         checks.row([
             Cell::text(question(check)),
@@ -164,6 +178,7 @@ pub(super) fn appendix(document: &Document, found: &Residuals, extended: bool) -
         appendix
             .push(Section::new("statistics", "Statistics of what was found").with(Block::Table(statistics(document))));
     }
+    appendix.extend(sensitivity(document));
     if let Some(gains) = gains(document) {
         appendix.push(Section::new("gains", "Gain, with more and more held out").with(Block::Table(gains)));
     }

@@ -1,7 +1,7 @@
 //! Drift of every run under several calibrations, as a picture.
 
 use calib::CalibrationDrift;
-use report_page::{Axis, Block, Cell, Chart, Mark, Role, Series, Table};
+use report_page::{Axis, Bar, Bars, Block, Cell, Chart, Mark, Role, Series, Table};
 
 use super::words::of_millimetres;
 
@@ -10,6 +10,26 @@ type Drifts = [(String, Role, CalibrationDrift)];
 /// Runs on the axis: more cannot be read, and their sums stand in the table.
 const MAX_RUNS: usize = 400;
 
+/// The title of bars.
+pub(super) const BARS: &str = "Drift: position error at the end of a run, per cent of the distance driven";
+
+/// The drifts as bars; `None` where there is none.
+pub(super) fn bars(drifts: &Drifts, note: &str) -> Option<Bars> {
+    let bar = |(name, role, drift): &(String, Role, CalibrationDrift)| {
+        let percent = drift.drift_percent?;
+        let name = if *role == Role::Nominal { "as configured" } else { name };
+        Some(Bar {
+            name: name.to_owned(),
+            role: *role,
+            value: percent,
+            interval: None,
+            text: format!("{percent:.3} %"),
+        })
+    };
+    let bars: Vec<Bar> = drifts.iter().filter_map(bar).collect();
+    (!bars.is_empty()).then(|| Bars { title: BARS.to_owned(), bars, note: note.to_owned() })
+}
+
 /// The picture of the runs' ends, and the sums.
 pub(super) fn blocks(drifts: &Drifts) -> Vec<Block> {
     let mut blocks = vec![Block::Table(sums(drifts))];
@@ -17,6 +37,10 @@ pub(super) fn blocks(drifts: &Drifts) -> Vec<Block> {
     if first.runs.iter().all(|run| run.final_position_m.is_none()) {
         let why = first.why_null.as_deref().unwrap_or("nothing was measured");
         blocks.push(Block::Text(format!("No drift of runs is drawn: {why}.")));
+        return blocks;
+    }
+    // Of one run the table says all.
+    if first.runs.len() < 2 {
         return blocks;
     }
     let mut order: Vec<usize> =

@@ -53,6 +53,7 @@ pub(crate) fn write_fleet(fleet: &Fleet, file: &Path) -> Result<(), Failure> {
             "Predicted excess drift is how far the configured geometry takes a robot from where its latest calibration does, on the runs of its latest session. Changes and excesses are judged at a false-discovery rate of {} over the fleet.",
             fleet.false_discovery_rate
         ),
+        bars: None,
         tiles: vec![
             tile("Robots with an excess", excessive.to_string(), "distinguishable from zero", "robots"),
             tile(

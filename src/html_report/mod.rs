@@ -6,11 +6,14 @@ mod campaign;
 mod diagnosis;
 mod diagnosis_details;
 mod drift;
+mod driven;
+mod first_screen;
 mod fleet;
 mod markdown;
 mod next_drive;
 mod paths;
 mod residuals;
+mod sweep_charts;
 mod words;
 
 pub(crate) use calibration::{CalibrationPage, EvaluationPage, write_comparison};

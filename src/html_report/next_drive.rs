@@ -49,20 +49,44 @@ fn floor(next: &NextExperiment) -> String {
     }
 }
 
-/// The fact of the first screen.
+/// The fact of the first screen; the section has every detail.
 pub(super) fn tile(document: &Document) -> Tile {
     match &document.next_experiment {
         Some(next) => tile_of(next),
-        None => {
-            let why = document.next_experiment_why_null.as_deref().unwrap_or("none was sought");
-            with_label("Nothing new".to_owned(), why.to_owned())
-        }
+        None => with_label(
+            "Nothing new".to_owned(),
+            "no drive was found that would add information; the reason is below".to_owned(),
+        ),
     }
 }
 
 /// The same of a plan.
 pub(super) fn tile_of(next: &NextExperiment) -> Tile {
-    with_label(capitalised(&next.drive), format!("{:.1} min {}", next.minutes, floor(next)))
+    let mut schedules = next.sessions.iter().flat_map(|session| &session.schedules);
+    let value = match (schedules.next(), schedules.next()) {
+        (Some(only), None) => manoeuvre(only),
+        _ => count(next.sessions.iter().map(|session| session.schedules.len()).sum(), "kind") + " of manoeuvre",
+    };
+    let runs = count(usize::try_from(next.runs).unwrap_or(usize::MAX), "run");
+    with_label(value, format!("{runs} in {:.1} min {}", next.minutes, floor(next)))
+}
+
+/// A manoeuvre in three words.
+fn manoeuvre(schedule: &Schedule) -> String {
+    match *schedule {
+        Schedule::Straights { length_m, .. } => format!("Straights of {length_m:.1} m"),
+        Schedule::Spins { turn_rad, .. } | Schedule::SpinsAtSpeeds { turn_rad, .. } => {
+            let turns = turn_rad.abs() / std::f64::consts::TAU;
+            if turns < 1.0 {
+                format!("Spins of {:.0}°", 360.0 * turns)
+            } else {
+                format!("Spins of {turns:.3} turns").replace(".000", "")
+            }
+        }
+        Schedule::Squares { side_m, .. } => format!("Squares with sides of {side_m:.1} m"),
+        Schedule::Circles { radius_m, .. } => format!("Circles with a radius of {radius_m:.2} m"),
+        Schedule::ValidationPath { length_m, .. } => format!("A path of {length_m:.0} m"),
+    }
 }
 
 fn with_label(value: String, note: String) -> Tile {
@@ -108,7 +132,7 @@ fn predictions(predicted: &Predicted) -> Chart {
     Chart {
         title: predictions_title(predicted),
         caption: format!(
-            "Where the {} runs will be seen, {when}, if one of these is the cause. Bars are 95 %: where they do not overlap, the drive tells the causes apart.",
+            "Where the {} runs will be seen, {when}, if one of these is the cause. Bars are 95 %: where they do not overlap, the drive separates the causes.",
             predicted.direction
         ),
         x: Axis::new("if the cause is", ""),
@@ -122,7 +146,7 @@ fn predictions(predicted: &Predicted) -> Chart {
 /// The section of a plan.
 pub(super) fn section_of(next: &NextExperiment) -> Section {
     let section = Section::new("next", TITLE);
-    let mut predicts = Table::new("What the drive will tell", &["cause", "what it is", "what it predicts"]);
+    let mut predicts = Table::new("What the drive will show", &["cause", "what it is", "what it predicts"]);
     for (id, prediction) in &next.predicts {
         let meaning = effects::description(id).map_or("not in the catalogue", |of| of.meaning);
         predicts.row([Cell::id(id.clone()), Cell::text(meaning), Cell::text(prediction.clone())]);

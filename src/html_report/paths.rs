@@ -2,10 +2,15 @@
 //! them.
 
 use ::diagnose::ExtendedModel;
-use calib::{AugmentedCalibration, CalibrationDrift, EvaluationOptions, RunPath, evaluate_runs_and_paths};
-use dataset::Dataset;
+use calib::{
+    AugmentedCalibration, CalibrationDrift, EvaluatedInstrument, EvaluationOptions, RunPath, evaluate_runs_and_paths,
+    with_instrument,
+};
+use dataset::{Dataset, Session};
 use kinematics::Pose;
-use report_page::{Block, PathPicture, PathRun, Role};
+use report_page::{Block, ErrorPicture, ModelErrors, PathPicture, PathRun, Role, RunErrors, Section};
+
+use super::driven::{self, Driven};
 
 /// A track of measurements is drawn where there is one for so many rows of the log; fewer are drawn as single
 /// positions, for lines between them would be no path.
@@ -25,6 +30,8 @@ pub(crate) struct Under<'c> {
 pub(crate) struct UnderCalibrations {
     pub(crate) drifts: Vec<(String, Role, CalibrationDrift)>,
     pub(crate) picture: Option<PathPicture>,
+    errors: Option<ErrorPicture>,
+    driven: Vec<Driven>,
     /// The logs were too large to be held.
     too_large: bool,
 }
@@ -33,16 +40,24 @@ impl UnderCalibrations {
     /// Dead reckoning of all runs. What a model cannot undo is dead-reckoned as it was recorded.
     pub(crate) fn of(datasets: &[Dataset], under: &[Under<'_>]) -> Self {
         let options = EvaluationOptions { name_runs: datasets.len() > 1, pose_errors: None };
+        let sessions: Vec<Session<'_>> = datasets.iter().map(Dataset::session).collect();
+        let instrument_of = |session: &Session<'_>| {
+            let own: Vec<_> = under.iter().filter_map(|of| Some(of.calibration?.in_session(session.name))).collect();
+            EvaluatedInstrument::of(own.iter().map(|own| &own.calibration), session)
+        };
+        let instruments: Vec<Option<EvaluatedInstrument>> = sessions.iter().map(instrument_of).collect();
         let mut runs_under: Vec<Vec<Option<RunPath>>> = Vec::new();
         let mut drifts = Vec::new();
         for of in under {
             let (mut paths, mut drift) = (Vec::new(), Vec::new());
-            for dataset in datasets {
+            for ((dataset, session), instrument) in datasets.iter().zip(&sessions).zip(&instruments) {
+                let own = of.calibration.map(|calibration| calibration.in_session(session.name));
+                let calibration = with_instrument(own.as_deref(), instrument.as_ref());
                 let undone =
                     of.model.filter(|model| model.changes_records()).and_then(|model| model.undone(dataset).ok());
                 let records = undone.as_ref().map_or(dataset, |(records, _)| records);
                 let session = records.session();
-                for (of_run, path) in evaluate_runs_and_paths(&session, of.calibration, &options, &mut 0.0) {
+                for (of_run, path) in evaluate_runs_and_paths(&session, calibration.as_deref(), &options, &mut 0.0) {
                     drift.push(of_run);
                     paths.push(path);
                 }
@@ -51,8 +66,27 @@ impl UnderCalibrations {
             drifts.push((of.name.clone(), of.role, CalibrationDrift::of_runs(named, drift)));
             runs_under.push(paths);
         }
-        let picture = picture(datasets, under, &runs_under, &drifts);
-        Self { drifts, picture, too_large: datasets.is_empty() }
+        let order = order(datasets, &drifts);
+        let picture = picture(under, &order, &runs_under);
+        let errors = errors(under, &order, &runs_under);
+        let mut nominal = runs_under.first().map_or(&[][..], Vec::as_slice);
+        let driven = datasets.iter().map(|dataset| {
+            let (own, rest) = nominal.split_at(dataset.runs.len().min(nominal.len()));
+            nominal = rest;
+            Driven::of(dataset, own)
+        });
+        let driven = driven.collect();
+        Self { drifts, picture, errors, driven, too_large: datasets.is_empty() }
+    }
+
+    /// What was driven; the table is taken out.
+    pub(super) fn driven_section(&mut self) -> Section {
+        driven::section(std::mem::take(&mut self.driven))
+    }
+
+    /// Errors along each run, where anything was measured; the picture is taken out.
+    pub(super) fn errors_block(&mut self) -> Option<Block> {
+        self.errors.take().map(Block::Errors)
     }
 
     /// The picture of the paths.
@@ -80,29 +114,76 @@ pub(super) fn run_names(datasets: &[Dataset]) -> Vec<String> {
     datasets.iter().flat_map(of).collect()
 }
 
-fn picture(
-    datasets: &[Dataset],
-    under: &[Under<'_>],
-    runs_under: &[Vec<Option<RunPath>>],
-    drifts: &[(String, Role, CalibrationDrift)],
-) -> Option<PathPicture> {
-    let names = run_names(datasets);
+/// Runs by name, the one that ends farthest from the truth with the first calibration at the front.
+fn order(datasets: &[Dataset], drifts: &[(String, Role, CalibrationDrift)]) -> Vec<(usize, String)> {
     let final_m =
         |run: usize| drifts.first().and_then(|(_, _, drift)| drift.runs.get(run)?.final_position_m).unwrap_or(0.0);
-    let mut order: Vec<usize> = (0..names.len()).collect();
-    order.sort_by(|a, b| final_m(*b).total_cmp(&final_m(*a)));
-    let runs: Vec<PathRun> = order
-        .into_iter()
-        .filter_map(|run| {
-            path_run(&names[run], &runs_under.iter().map(|paths| paths.get(run)?.as_ref()).collect::<Vec<_>>())
-        })
-        .collect();
+    let mut order: Vec<(usize, String)> = run_names(datasets).into_iter().enumerate().collect();
+    order.sort_by(|(a, _), (b, _)| final_m(*b).total_cmp(&final_m(*a)));
+    order
+}
+
+/// One run under every calibration.
+fn under_each(runs_under: &[Vec<Option<RunPath>>], run: usize) -> Vec<Option<&RunPath>> {
+    runs_under.iter().map(|paths| paths.get(run)?.as_ref()).collect()
+}
+
+/// Errors along each run; `None` where nothing was measured at two instants of any.
+fn errors(under: &[Under<'_>], order: &[(usize, String)], runs_under: &[Vec<Option<RunPath>>]) -> Option<ErrorPicture> {
+    let of = |(run, name): &(usize, String)| run_errors(name, &under_each(runs_under, *run));
+    let runs: Vec<RunErrors> = order.iter().filter_map(of).collect();
+    (!runs.is_empty()).then(|| ErrorPicture {
+        title: "Errors along a run".to_owned(),
+        caption: "How far dead reckoning is from the measured pose, from where the run was first measured on. The run that ends farthest from the truth is chosen first.".to_owned(),
+        models: under.iter().map(|of| (of.name.clone(), of.role)).collect(),
+        runs,
+    })
+}
+
+fn run_errors(name: &str, under: &[Option<&RunPath>]) -> Option<RunErrors> {
+    let last = under.iter().rev().find_map(|path| *path)?;
+    let instants: Vec<usize> = (0..last.measured.len()).filter(|at| last.at_measured[*at].is_some()).collect();
+    let (first, _) = (instants.first()?, instants.get(1)?);
+    let poses: Vec<Pose> = instants.iter().filter_map(|at| last.at_measured[*at]).collect();
+    let mut distance_m = vec![0.0; poses.len()];
+    for (k, pair) in poses.windows(2).enumerate() {
+        distance_m[k + 1] = distance_m[k] + (pair[1].x_m - pair[0].x_m).hypot(pair[1].y_m - pair[0].y_m);
+    }
+    let model = |path: &Option<&RunPath>| {
+        let path = path.filter(|path| path.at_measured.len() == last.measured.len())?;
+        let pairs = || instants.iter().map(|at| (path.at_measured[*at], last.measured[*at]));
+        let position_m = |(found, seen): (Option<Pose>, Pose)| {
+            found.map_or(f64::NAN, |found| (found.x_m - seen.x_m).hypot(found.y_m - seen.y_m))
+        };
+        let heading_rad = |(found, seen): (Option<Pose>, Pose)| {
+            found.map_or(f64::NAN, |found| kinematics::wrap_to_pi(found.theta_rad - seen.theta_rad))
+        };
+        let mut errors = ModelErrors {
+            position_m: pairs().map(position_m).collect(),
+            heading_rad: pairs().map(heading_rad).collect(),
+        };
+        if errors.heading_rad.iter().all(|error_rad| error_rad.is_nan()) {
+            errors.heading_rad.clear();
+        }
+        Some(errors)
+    };
+    Some(RunErrors {
+        name: name.to_owned(),
+        t_s: instants.iter().map(|at| last.measured_t_s[*at] - last.measured_t_s[*first]).collect(),
+        distance_m,
+        models: under.iter().map(model).collect(),
+    })
+}
+
+fn picture(under: &[Under<'_>], order: &[(usize, String)], runs_under: &[Vec<Option<RunPath>>]) -> Option<PathPicture> {
+    let of = |(run, name): &(usize, String)| path_run(name, &under_each(runs_under, *run));
+    let runs: Vec<PathRun> = order.iter().filter_map(of).collect();
     if runs.is_empty() {
         return None;
     }
     let any_truth = runs.iter().any(|run| !run.tracks[0].is_empty() || !run.marks.is_empty());
     let caption = if any_truth {
-        "Every run begins where it was first measured, and is then dead-reckoned. The run that ends farthest from the truth stands first in the list. Deviations of millimetres are hard to see on metres: the menu draws them larger."
+        "Every run begins where it was first measured, and is then dead-reckoned. The run that ends farthest from the truth is first in the list. The menu magnifies deviations."
     } else {
         "No pose was measured: every run begins at the origin, and nothing says which path is right."
     };

@@ -18,7 +18,7 @@ pub(super) fn charts_that_matter(residuals: &Residuals, extended: bool) -> Vec<C
 }
 
 /// How to read them, for who drives and does no statistics.
-pub(super) const HOW_TO_READ: &str = "Each point is how far the measured pose was, on average, from where the odometry had the robot a moment after the last measurement: ahead (along), to the left (across) or turned to the left (heading). What was recorded while driving is along the bottom. A flat line at zero means that the odometry is right whatever stands along the bottom; a slope or a wave means that the error comes with it.";
+pub(super) const HOW_TO_READ: &str = "Each point is the mean difference between a measured pose and its prediction by the odometry from the measurement before: ahead (along), to the left (across) or turned to the left (heading). The horizontal axis is a quantity that was recorded while driving. A flat line at zero means that the odometry is right whatever this quantity is; a slope or a wave means that the error depends on it.";
 
 /// All of them: first those in which something shows, the strongest first; then the others.
 pub(super) fn all_charts(residuals: &Residuals, extended: bool) -> [Vec<Chart>; 2] {

@@ -24,22 +24,51 @@ pub(super) fn plus_minus(value: f64, sigma: Option<f64>) -> String {
     }
 }
 
-/// The parameters of a calibration beside the robot's nominal ones.
+/// A parameter in words and the unit of a workshop: name, unit, and what takes it there from SI.
+fn in_workshop_units(key: &str) -> (String, &'static str, f64) {
+    const UNITS: [(&str, &str, f64); 7] = [
+        ("_rad_s", "°/s", 180.0 / std::f64::consts::PI),
+        ("_m_per_tick", "µm per count", 1e6),
+        ("_rad_m", "mrad/m", 1e3),
+        ("_m_s", "mm/s", 1e3),
+        ("_m", "mm", 1e3),
+        ("_rad", "°", 180.0 / std::f64::consts::PI),
+        ("_s", "ms", 1e3),
+    ];
+    let of = UNITS.iter().find_map(|(suffix, unit, scale)| Some((key.strip_suffix(suffix)?, *unit, *scale)));
+    let (name, unit, scale) = of.unwrap_or((key, "", 1.0));
+    let wheel = if key.ends_with("_m_per_tick") { " wheel" } else { "" };
+    (name.replace('_', " ") + wheel, unit, scale)
+}
+
+/// The parameters of a calibration with the robot's nominal ones, in the units of a workshop. A wheel is
+/// shown by its diameter, not by metres per count as well.
 pub(super) fn parameters<'p>(
     caption: &str,
     values: impl IntoIterator<Item = (&'p String, &'p ReportedValue)>,
     nominal: impl Fn(&str) -> Option<f64>,
 ) -> Block {
-    let mut table = Table::new(caption, &["parameter", "nominal", "calibrated ± one standard deviation", "change"]);
-    for (key, value) in values {
-        let stated = nominal(key);
-        let shown = value.value.map_or_else(|| "not determined".to_owned(), |found| plus_minus(found, value.sigma));
+    let values: Vec<(&String, &ReportedValue)> = values.into_iter().collect();
+    let has_diameter = |key: &str| {
+        let diameter = key.strip_suffix("_m_per_tick").map(|side| format!("{side}_wheel_diameter_m"));
+        diameter.is_some_and(|diameter| values.iter().any(|(own, _)| **own == diameter))
+    };
+    let headings = ["parameter", "nominal", "calibrated ± one standard deviation", "unit", "change"];
+    let mut table = Table::new(caption, &headings);
+    for (key, value) in values.iter().filter(|(key, _)| !has_diameter(key)) {
+        let (name, unit, scale) = in_workshop_units(key);
+        let stated = nominal(key).map(|stated| scale * stated);
+        let shown = value.value.map_or_else(
+            || "not determined".to_owned(),
+            |found| plus_minus(scale * found, value.sigma.map(|sigma| scale * sigma)),
+        );
         let change =
             value.ratio_to_nominal.map_or_else(|| "–".to_owned(), |ratio| format!("{:+.3} %", 100.0 * (ratio - 1.0)));
         table.row([
-            Cell::id(key.clone()),
+            Cell::text(name),
             Cell::number(stated.map_or_else(|| "–".to_owned(), plain)),
             Cell::number(shown),
+            Cell::text(unit),
             Cell::number(change),
         ]);
     }
@@ -77,6 +106,32 @@ pub(super) fn count(number: usize, what: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn parameters_are_in_the_units_of_a_workshop_and_a_wheel_has_one_row() {
+        let shown = |key| in_workshop_units(key);
+        assert_eq!(shown("left_wheel_diameter_m"), ("left wheel diameter".to_owned(), "mm", 1e3));
+        assert_eq!(
+            (shown("truth_latency_s").1, shown("sensor_theta_rad").1, shown("gyro_bias_rad_s").1),
+            ("ms", "°", "°/s")
+        );
+        let value = ReportedValue {
+            value: Some(0.16),
+            sigma: Some(1e-5),
+            ratio_to_nominal: None,
+            sigma_why_null: None,
+            interval_95: None,
+        };
+        let values: Vec<(String, ReportedValue)> = ["left_m_per_tick", "left_wheel_diameter_m", "right_m_per_tick"]
+            .map(|key| (key.to_owned(), value.clone()))
+            .into();
+        let Block::Table(table) = parameters("", values.iter().map(|(key, value)| (key, value)), |_| None) else {
+            panic!("a table")
+        };
+        let names: Vec<&Cell> = table.rows.iter().map(|row| &row[0]).collect();
+        assert_eq!(names, [&Cell::text("left wheel diameter"), &Cell::text("right wheel")]);
+        assert_eq!(table.rows[0][2], Cell::number("160.000 ± 0.010"));
+    }
 
     #[test]
     fn small_values_have_an_exponent_and_others_have_none() {

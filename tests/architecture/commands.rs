@@ -267,6 +267,31 @@ mod documents_show_what_commands_print {
     }
 
     #[test]
+    fn guide_ros2_motion_capture() {
+        shows_what_its_commands_print("docs/guide-ros2-motion-capture.md", 5);
+    }
+
+    #[test]
+    fn guide_ros2_slam() {
+        shows_what_its_commands_print("docs/guide-ros2-slam.md", 4);
+    }
+
+    #[test]
+    fn guide_gyro_and_tape() {
+        shows_what_its_commands_print("docs/guide-gyro-and-tape.md", 5);
+    }
+
+    #[test]
+    fn guide_recordings() {
+        shows_what_its_commands_print("docs/guide-recordings.md", 7);
+    }
+
+    #[test]
+    fn guide_own_method() {
+        shows_what_its_commands_print("docs/guide-own-method.md", 4);
+    }
+
+    #[test]
     fn real_robots() {
         shows_what_its_commands_print("docs/real-robots.md", 0);
     }

@@ -9,6 +9,7 @@ mod arrows;
 mod commands;
 mod documents;
 mod effect_ids;
+mod english;
 mod examples;
 mod file_graph;
 mod files;

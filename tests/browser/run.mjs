@@ -57,6 +57,14 @@ function pages() {
     if (file === "dataset.toml") said = `name = "${HOSTILE}"\nnotes = "${HOSTILE}"\n${said}`;
     writeFileSync(join(hostile, file), said);
   }
+  // An instrument that is late, and nothing else; and a robot of rigid bodies, whose cause is in no catalogue.
+  const late = text.replace(effects, "").replace(/^latency_s = .*$/m, "latency_s = 0.06");
+  writeFileSync(join(work, "late.toml"), late);
+  yair("simulate", "late.toml", "--out", "late");
+  yair("diagnose", "late", "--out", "instrument");
+  yair("diagnose", join(root, "tests/physics/logs/high_centre_of_mass-0100"), "--out", "unlisted");
+  yair("simulate", join(root, "scenarios/skid-steer.toml"), "--out", "skid");
+  yair("diagnose", "skid", "--out", "one");
   yair("diagnose", "robot", "--out", "found");
   yair("diagnose", "plain", "--out", "consistent");
   yair("diagnose", "hostile", "--out", "hostile-page");
@@ -75,9 +83,29 @@ function pages() {
   mkdirSync(join(work, "fleet"));
   yair("fleet", "robots", "--html", "fleet/report.html");
   const drive = { runs: true };
+  const real = {};
+  // Logs of real robots, where they are: fourteen sessions under motion capture, and a stranger's robot.
+  const data = process.env.YAIR_DATA || join(root, "../shared/data");
+  if (existsSync(join(data, "optiodom/diff"))) {
+    yair("import", "optiodom", join(data, "optiodom/diff"), "--out", "june");
+    yair("diagnose", "june", "--out", "june-page");
+    real["june-page"] = { ...drive, first: "june" };
+  }
+  if (existsSync(join(data, "field/turtlebot0_wheels.csv"))) {
+    const [wheels, poses] = ["wheels", "mocap"].map((part) => join(data, `field/turtlebot0_${part}.csv`));
+    yair("import", "csv", wheels, poses, "--wheel", "0.07", "--base", "0.23", "--ticks-per-rev", "2578.33", "--counter-bits", "16", "--out", "kobuki");
+    yair("diagnose", "kobuki", "--out", "kobuki-page");
+    real["kobuki-page"] = { ...drive, first: "kobuki" };
+  }
+  if (Object.keys(real).length < 2) {
+    console.log(`skipped: browser: pages of real robots: ${data} has no logs`);
+    if (process.env.YAIR_REQUIRE_DATA === "1") throw new Error(`YAIR_REQUIRE_DATA=1, and ${data} has no logs`);
+  }
   return {
-    found: { ...drive, answers: ["Cause", "Size", "Gain", "Drive next"], small: true },
-    consistent: { ...drive, answers: ["Cause", "Drift", "Could not show", "Drive next"] },
+    ...real,
+    one: { ...drive, first: "one" }, instrument: { ...drive, first: "instrument" }, unlisted: { ...drive, first: "unlisted" },
+    found: { ...drive, answers: ["Cause", "Size", "About the measurement", "Drive next"], small: true, first: "several" },
+    consistent: { ...drive, answers: ["Cause", "Could not show", "About the measurement", "Drive next"], first: "none" },
     ambiguous: { ...drive, next: true },
     "hostile-page": { ...drive, hostile: true },
     calibrate: drive, evaluate: drive, compare: { plain: true }, plan: { still: true }, sweep: {}, reproduce: {},
@@ -208,10 +236,80 @@ async function look(browser, name, wanted) {
     check(name, "names of runs run nothing", (await page.evaluate(() => window.broken)) === undefined && errors.length === 0, errors.join("; "));
     check(name, "the name of a run is shown as text", (await page.evaluate(() => document.body.innerText)).includes(HOSTILE));
   }
+  if (wanted.first) await firstScreen(page, name, wanted.first);
   await page.emulateMedia({ media: "print" });
   const controls = await page.$$eval("button, input, select, nav", (all) => all.filter((one) => one.getClientRects().length > 0).map((one) => one.outerHTML.slice(0, 60)));
   check(name, "print has no controls", controls.length === 0, `${controls.length}: ${controls[0]}`);
   await context.close();
+}
+
+/** What the first screen of each kind of log must say; numbers are those of the JSON document. `drift` says how many
+ * bars there are, of held-out runs but for a single run. */
+const FIRST_SCREENS = {
+  none: { drift: 2, headline: /^Calibrate the wheels first: the drift falls from/, cause: /^Nothing seen/ },
+  one: { drift: 2, headline: /skidding in turns shortens the distance driven/i, cause: /^Skidding in turns/, id: "turn_slip" },
+  several: { drift: 3, headline: /What is left: a wheel is not round or not centred\.$/, cause: /^A wheel is not round/, id: "wheel_eccentricity" },
+  // The instrument's clock is no headline.
+  instrument: { drift: 3, headline: /^Calibrate the wheels first/, not: /late|timestamp/, measurement: /^The instrument's timestamps are late/, id: "truth_latency" },
+  unlisted: { drift: 3, headline: /^Calibrate the wheels first/, badge: "Cause not certain" },
+  june: { drift: 3, headline: /the faster the robot turns, the nearer together its wheels act\.$/, cause: /nearer together/, badge: "Cause not certain", id: "turn_rate_wheelbase" },
+  kobuki: { drift: 2, one: true, headline: /./, not: /mounted at an angle/, measurement: /^The instrument is mounted at an angle/, id: "truth_yaw" },
+};
+
+/** The first screen of a diagnosis by content: what the page says against what the JSON document says. */
+async function firstScreen(page, name, kind) {
+  const wanted = FIRST_SCREENS[kind];
+  const document = JSON.parse(readFileSync(join(work, name, "findings.json"), "utf8"));
+  const shown = await page.evaluate(() => {
+    const text = (selector) => [...window.document.querySelectorAll(selector)].map((one) => one.textContent.trim());
+    const tiles = Object.fromEntries([...window.document.querySelectorAll(".tiles > div")].map((tile) =>
+      [tile.querySelector("dt").textContent, { text: tile.querySelector(".value").textContent, lines: [...tile.querySelectorAll("dd")].map((dd) => Math.round(dd.getClientRects()[0].height / parseFloat(getComputedStyle(dd).lineHeight))) }]));
+    return { headline: text("h1")[0], lead: text(".lead")[0] || "", badge: text(".badge")[0], header: window.document.querySelector("header").innerText, bars: text(".bars .number"), tiles };
+  });
+  const { headline, tiles, bars } = shown;
+  check(name, "the headline says what to change first", wanted.headline.test(headline) && !(wanted.not && wanted.not.test(headline)), headline);
+  check(name, "one bar for each drift", bars.length === wanted.drift, bars.join(", "));
+  const drift = document.drift;
+  check(name, "drift is of held-out runs, but for a single run", Boolean(drift) === !wanted.one);
+  if (drift) {
+    const values = [drift.nominal, drift.calibrated, drift.extended].filter(Boolean);
+    const agree = bars.every((bar, k) => Math.abs(parseFloat(bar) - values[k].percent) <= 0.05 * values[k].percent && bar.includes("±"));
+    check(name, "bars show the drift of the document", agree, `${bars.join(", ")}: ${values.map((one) => one.percent).join(", ")}`);
+    const { base, extended, low } = drift.calibrated_over_nominal;
+    if (low > 0) {
+      const numbers = (headline + shown.lead).match(/falls from ([\d.]+) % to ([\d.]+) %/);
+      const near = (text, value) => Math.abs(parseFloat(text) - value) <= 0.06 * value;
+      check(name, "the sentence has the drift of the document", numbers !== null && near(numbers[1], base) && near(numbers[2], extended), headline);
+    }
+  }
+  if (wanted.id) check(name, "it is the finding of the document", document.findings.some(({ id }) => id === wanted.id), document.findings.map(({ id }) => id).join(", "));
+  if (wanted.badge) check(name, "the badge says how certain it is", shown.badge === wanted.badge, shown.badge);
+  const tile = (label) => tiles[label] ? tiles[label].text : "";
+  if (wanted.cause) check(name, "the tile has the cause", wanted.cause.test(tile("Cause")), tile("Cause"));
+  if (wanted.measurement) check(name, "the instrument has its own tile", wanted.measurement.test(tile("About the measurement")), tile("About the measurement"));
+  const identifiers = shown.header.replace(/^.*yair .*$/m, "").match(/\b[a-z]+_[a-z_]+\b/g) || [];
+  check(name, "no identifiers on the first screen", identifiers.length === 0, identifiers.join(", "));
+  const long = Object.entries(tiles).filter(([, { lines }]) => lines.some((count) => count > 3)).map(([label, { lines }]) => `${label}: ${lines}`);
+  check(name, "tiles have three lines at most", long.length === 0, long.join("; "));
+  const signs = Object.values(tiles).map(({ text }) => text).concat(headline).filter((text) => /[−-]\d/.test(text));
+  check(name, "signs are words", signs.length === 0, signs.join("; "));
+  // A run is chosen, and its errors are drawn.
+  const select = await page.$("figure.errors select");
+  check(name, "errors along a run are drawn", select !== null && (await page.$$("figure.errors canvas")).length > 0);
+  if ((await page.$$("figure.errors select:first-of-type option")).length > 3) {
+    const before = await page.$eval("figure.errors canvas", pixels);
+    await select.selectOption("1");
+    check(name, "another run has other errors", (await page.$eval("figure.errors canvas", pixels)).sum !== before.sum);
+  }
+  const pages = await printed(page);
+  check(name, "prints on eight pages at most without the appendix", pages <= 8, `${pages}`);
+}
+
+/** Pages of paper without the appendix. */
+async function printed(page) {
+  await page.evaluate(() => document.getElementById("appendix")?.remove());
+  const paper = await page.pdf({ format: "A4" });
+  return (paper.toString("latin1").match(/\/Type\s*\/Page[^s]/g) || []).length;
 }
 
 /** What the tutorial makes (docs/tutorial.md): the robot that drifts, diagnosed. */

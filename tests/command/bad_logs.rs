@@ -202,7 +202,13 @@ fn what_the_runs_do_not_determine_has_no_value() {
     let (values, message) = calibrated(at, "straights");
     let [left, right, separation] = values.expect("calibrated");
     assert!((left.expect("a value") - TRUE_MM[0]).abs() < TOLERANCE_MM && right.is_some() && separation.is_none());
-    assert!(message.contains("not_determined"), "{message}");
+    assert_eq!(message, "");
+    let check = run_in(at, &["check", "straights"]);
+    assert!(
+        check.stdout.contains("not_determined: these runs do not determine wheel_separation_m"),
+        "{}",
+        check.stdout
+    );
     let ended = run_in(at, &["calibrate", "straights", "--out", "found.toml"]);
     assert!(ended.stdout.contains("not determined: wheel_separation_m: "), "{}", ended.stdout);
     let file = fs::read_to_string(at.join("found.toml")).expect("written");

@@ -9,6 +9,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use bench::FolderLock;
+use serde_json::Value;
 use yaml_rust2::{Yaml, YamlLoader};
 
 use crate::support::{refusal, run_in, succeed};
@@ -178,4 +179,52 @@ fn parts_of_the_blind_benchmark_merge_to_the_bytes_of_one_machine() {
         let refused = refusal(folder, &[&merge[..], parts].concat());
         assert!(refused.contains(why), "{parts:?}: {refused}");
     }
+}
+
+/// Parts are files that anybody may have written: numbers of no case and cases of no part are refused.
+#[test]
+fn a_part_that_no_campaign_can_have_made_is_not_merged() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    let campaign = ["challenge", "--cases", "2", "--seed", "5", "--shard", "1/1", "--out", "part", "--quiet"];
+    succeed(folder, &campaign);
+    let file = folder.join("part/challenge.shard.json");
+    let sound: Value = serde_json::from_slice(&fs::read(&file).expect("read")).expect("JSON");
+    let merge = ["challenge", "--merge", "part"];
+    let scored = |outcome: &Value| outcome.get("scored").is_some();
+    let first = sound["outcomes"].as_array().expect("a list").iter().position(scored).expect("a case that was driven");
+    let with = |pointer: &str, text: &str| {
+        let mut changed = sound.clone();
+        *changed.pointer_mut(&pointer.replace('#', &format!("/outcomes/{first}/scored"))).expect(pointer) =
+            "here".into();
+        let text = serde_json::to_string(&changed).expect("JSON").replace("\"here\"", text);
+        fs::write(&file, text).expect("written");
+        refusal(folder, &merge)
+    };
+    let reported = r#"[{"names":["x"],"probability":2.0,"z":1.0,"covered":[],"errors":[],"sentence":""}]"#;
+    for (pointer, text) in [
+        ("#/drawn/sigma_xy_m", "1e999"),
+        ("#/drawn/sigma_xy_m", "1e308"),
+        ("#/drawn/wheel_separation_m", "-0.3"),
+        ("#/drawn/lost_row_share", "1.5"),
+        ("#/drawn/ripple", "[1e61, 1.0]"),
+        ("#/gain", "[0.0, -1e308]"),
+        ("#/other_session", "1e61"),
+        ("#/said", reported),
+        ("#/said", &reported.replace("2.0", "0.5").replace("1.0", "1e61")),
+        ("#/said", &reported.replace("2.0", "0.5").replace(r#""errors":[]"#, r#""errors":[-1e308]"#)),
+    ] {
+        let why = with(pointer, text);
+        assert!(
+            why.contains("part/challenge.shard.json: not a part of a blind benchmark"),
+            "{pointer} = {text}: {why}"
+        );
+    }
+    // The part of two cases has both, each once.
+    for (pointer, text) in [("#/case", "7"), ("/outcomes", "[]"), ("/campaign/cases", "3"), ("/campaign/cases", "1")] {
+        let why = with(pointer, text);
+        assert!(why.contains("part: its cases are not those of part 1/1"), "{pointer} = {text}: {why}");
+    }
+    fs::write(&file, serde_json::to_vec(&sound).expect("JSON")).expect("written");
+    succeed(folder, &merge);
 }

@@ -232,14 +232,14 @@ fn several_datasets_are_named_in_every_document() {
     let message = refusal(at, &["calibrate", "set", "./second/../set"]);
     assert!(message.contains("given twice"), "{message}");
     // Runs that the drift leaves out are counted where a person reads it.
-    let displacement = "run,t0_s,t1_s,dx_m,dy_m,dtheta_rad\na,0,1,0.1,0,0\n";
+    let tape = "run,t0_s,t1_s,distance_m,sigma_m\na,0,1,0.1,0.001\n";
     let toml = fs::read_to_string(at.join("set/dataset.toml")).expect("read");
     let robot = toml.split("[[run]]").next().expect("a head").split("[truth]").next().expect("a head");
     fs::create_dir(at.join("relative")).expect("made");
     for (file, content) in [
         ("dataset.toml", format!("{robot}[[run]]\nid = \"a\"\n")),
         ("odometry.csv", "run,t_s,left_ticks,right_ticks\na,0,0,0\na,1,9,9\n".to_owned()),
-        ("displacement.csv", displacement.to_owned()),
+        ("distance.csv", tape.to_owned()),
     ] {
         fs::write(at.join("relative").join(file), content).expect("written");
     }
@@ -279,8 +279,9 @@ fn exit_codes_are_those_of_the_contract() {
 fn quiet_is_quiet_and_results_go_to_standard_output() {
     let at = &workplace();
     let at = at.path();
-    let commands: [&[&str]; 4] = [
-        &["simulate", "paper.toml", "--out", "new"],
+    let simulated = succeed(at, &["simulate", "paper.toml", "--out", "new", "--quiet"]);
+    assert_eq!((&simulated.stdout[..], &simulated.stderr[..]), ("", ""));
+    let commands: [&[&str]; 3] = [
         &["calibrate", "set", "--out", "found.toml"],
         &["evaluate", "set"],
         &["sweep", "paper.toml", "--trials", "2", "--out", "swept"],

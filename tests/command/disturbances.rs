@@ -6,8 +6,9 @@ use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
-use crate::interrupt::long_table;
+use crate::interrupt::{is_being_written, long_table};
 use crate::support::{Ended, everything_in, run_in, succeed};
 
 const YAIR: &str = env!("CARGO_BIN_EXE_yair");
@@ -165,7 +166,7 @@ fn input_that_changes_while_it_is_read_gives_a_dataset_or_a_refusal() {
                     std::thread::yield_now();
                 }
                 // The middle of the reading, on a machine that is idle.
-                std::thread::sleep(std::time::Duration::from_millis(4));
+                std::thread::sleep(Duration::from_millis(4));
                 change(&log, &table);
             });
             begun.store(true, Ordering::Relaxed);
@@ -201,6 +202,31 @@ fn of_two_processes_with_one_folder_one_ends_well() {
     names.sort();
     assert_eq!(names, ["found", "log.csv", "set"]);
     succeed(here, &["check", "set"]);
+}
+
+/// What comes to stand under a dataset's name while it is made stays; the words are not the system's.
+#[test]
+fn a_folder_that_is_filled_meanwhile_stays_and_is_said() {
+    let temp = tempfile::tempdir().expect("a folder");
+    let here = temp.path();
+    fs::write(here.join("log.csv"), long_table(150_000)).expect("written");
+    let words: Vec<&str> = IMPORT.split_whitespace().collect();
+    let mut command = Command::new(YAIR);
+    command.current_dir(here).args(&words).stdout(Stdio::null()).stderr(Stdio::piped());
+    let mut child = command.spawn().expect("starts");
+    while !is_being_written(here) {
+        assert_eq!(child.try_wait().expect("it can be asked"), None, "it is seen at its work");
+        std::thread::sleep(Duration::from_micros(200));
+    }
+    fs::create_dir(here.join("set")).expect("made");
+    fs::write(here.join("set/mine"), "mine").expect("written");
+    let ended = child.wait_with_output().expect("it ends");
+    let said = String::from_utf8(ended.stderr).expect("UTF-8");
+    assert_eq!(ended.status.code(), Some(1), "{said}");
+    assert!(said.contains("set: already exists and is not empty; nothing was written"), "{said}");
+    assert!(!said.contains("os error"), "{said}");
+    let left: Vec<_> = ["log.csv", "set", "set/mine"].map(|name| here.join(name)).into();
+    assert_eq!(everything_in(here), left);
 }
 
 #[test]

@@ -7,7 +7,7 @@ use std::path::Path;
 use crate::support::{document, everything_in, refusal, succeed, usage};
 
 /// A calibration file with what `joint` writes of a small robot.
-const CALIBRATION: &str = "[[methods]]\nmethod = \"joint\"\nruns_used = 3\nconverged = true\n\
+pub(crate) const CALIBRATION: &str = "[[methods]]\nmethod = \"joint\"\nruns_used = 3\nconverged = true\n\
     [methods.noise]\nwheel_sigma_m_per_sqrt_m = 0.001\nturn_sigma_rad_per_sqrt_rad = 0.002\n\
     [methods.parameters]\n\
     left_wheel_diameter_m = { value = 0.202, sigma = 2e-5, ratio_to_nominal = 1.01 }\n\
@@ -70,7 +70,9 @@ fn a_calibration_gets_onto_a_robot_in_every_format() {
     assert!(refusal(at, &to_file(&["--without-effects"])).contains("give --replace"));
     succeed(at, &to_file(&["--replace"]));
     succeed(at, &to_file(&["--force"]));
-    for format in ["c", "mm", "roadrunner", "turtlebot3", "wpilib"] {
+    for format in
+        ["c", "clearpath", "create3", "mm", "robot-localization", "urdf", "roadrunner", "turtlebot3", "wpilib"]
+    {
         let found = document(at, &["export", format, "c.toml"]);
         assert_eq!(
             (&found["format"], &found["calibration"], &found["out"]),
@@ -148,7 +150,7 @@ fn a_header_says_the_drift_that_is_left_on_board() {
     let said = succeed(at, &["export", "c", "c.toml", "--dataset", "set"]).stderr;
     assert!(said.starts_with("drift: nominal ") && said.contains(" %, on board "), "{said}");
     fs::remove_file(at.join("set/truth.csv")).expect("there");
-    fs::write(at.join("set/displacement.csv"), "run,t0_s,t1_s,dx_m,dy_m,dtheta_rad\na,0,1,0.5,0,0\nb,0,1,0.5,0,0\n")
+    fs::write(at.join("set/distance.csv"), "run,t0_s,t1_s,distance_m,sigma_m\na,0,1,0.5,0.01\nb,0,1,0.5,0.01\n")
         .expect("written");
     let found = document(at, &["export", "c", "c.toml", "--dataset", "set"]);
     let why = found["drift_percent"]["why_null"].as_str().unwrap_or_default().to_owned();

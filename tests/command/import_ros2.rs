@@ -18,7 +18,7 @@ const TRUE_M: [f64; 3] = [0.153, 0.1527, 0.309];
 /// and more.
 const TOLERANCE_M: f64 = 0.5e-3;
 
-const ROBOT: [&str; 4] = ["--wheel", "0.15", "--base", "0.3"];
+pub(crate) const ROBOT: [&str; 4] = ["--wheel", "0.15", "--base", "0.3"];
 /// Counts without a stamp in a type that nobody knows, and transforms.
 const ENCODERS: [&str; 16] = [
     "--wheels",
@@ -39,7 +39,7 @@ const ENCODERS: [&str; 16] = [
     "world,base_link",
 ];
 
-fn bag(name: &str) -> String {
+pub(crate) fn bag(name: &str) -> String {
     let path: PathBuf = [env!("CARGO_MANIFEST_DIR"), "tests", "ros2", name].iter().collect();
     path.display().to_string()
 }
@@ -54,7 +54,7 @@ fn decompressed(name: &str) -> Vec<u8> {
 
 /// Imports, and gives the two tables and all warnings.
 #[track_caller]
-fn imported(at: &Path, bag: &str, flags: &[&str]) -> ([String; 2], String) {
+pub(crate) fn imported(at: &Path, bag: &str, flags: &[&str]) -> ([String; 2], String) {
     let arguments = [&["import", "ros2", bag, "--out", "new", "--force"], &ROBOT[..], flags].concat();
     let ended = run_in(at, &arguments);
     assert_eq!(ended.code, Some(0), "{arguments:?}: {}", ended.stderr);
@@ -64,7 +64,7 @@ fn imported(at: &Path, bag: &str, flags: &[&str]) -> ([String; 2], String) {
 
 /// The dataset `new` calibrates to the robot.
 #[track_caller]
-fn calibrates(at: &Path) {
+pub(crate) fn calibrates(at: &Path) {
     let found = document(at, &["calibrate", "new"]);
     let parameters = &found["methods"][0]["parameters"];
     for (key, true_m) in ["left_wheel_diameter_m", "right_wheel_diameter_m", "wheel_separation_m"].iter().zip(TRUE_M) {
@@ -237,7 +237,14 @@ fn what_cannot_be_told_is_asked_for() {
         assert!(words.iter().all(|word| message.contains(word)), "{words:?}: {message}");
     };
     let (joints, counts) = (bag("zstd.mcap"), bag("by_file"));
-    refused(&joints, &[], &["give --wheel DIAMETER_M --base SEPARATION_M, like this: yair import ros2", "--out new"]);
+    refused(
+        &joints,
+        &[],
+        &[
+            "give --wheel DIAMETER_M --base SEPARATION_M, or --robot FILE with the robot's controllers.yaml, URDF or dataset.toml, like this: yair import ros2",
+            "--out new",
+        ],
+    );
     refused(
         &joints,
         &["--wheels", "/nothing"],
@@ -282,6 +289,11 @@ fn what_cannot_be_told_is_asked_for() {
 /// Our own recorder's bag: a robot that spins and drives for 20 s, its wheels 20 times a second, and a
 /// gyroscope 100 times a second without those of 5 to 6 s.
 fn bag_with_gyro(path: &Path, variance_rad2_s2: f64) {
+    bag_of_gyro(path, variance_rad2_s2, true);
+}
+
+/// The same, with or without its poses.
+fn bag_of_gyro(path: &Path, variance_rad2_s2: f64, has_truth: bool) {
     let yaw_rate = |t_s: f64| 0.5 * (0.4 * t_s).sin();
     let heading = |t_s: f64| 0.5 / 0.4 * (1.0 - (0.4 * t_s).cos());
     let rows_s: Vec<f64> = (0..=400).map(|row| 0.05 * f64::from(row)).collect();
@@ -293,10 +305,31 @@ fn bag_with_gyro(path: &Path, variance_rad2_s2: f64) {
     let instants = (0..=2000).map(|step| 0.01 * f64::from(step) + 0.003).filter(|t_s| !(5.0..6.0).contains(t_s));
     let gyro = RecordedGyro { yaw_rates_rad_s: instants.map(|t_s| (t_s, yaw_rate(t_s))).collect(), variance_rad2_s2 };
     let wheels = Some(RecordedWheels::Angles(wheels));
-    let run = RecordedRun { truth: &truth, rows_s: &rows_s, wheels, gyro: Some(gyro), paths: Vec::new() };
-    let mut recorder = Recorder::new(fs::File::create(path).expect("made")).expect("a bag");
-    recorder.push(&run).expect("written");
-    recorder.finish().expect("written");
+    let truth = if has_truth { &truth[..] } else { &[] };
+    let run = RecordedRun { truth, rows_s: &rows_s, wheels, gyro: Some(gyro), paths: Vec::new() };
+    let mut recorder = Recorder::default();
+    recorder.push(&run).expect("few topics");
+    fs::write(path, recorder.finish().0).expect("written");
+}
+
+/// One turn on the spot, at rest before and after.
+#[test]
+fn a_run_that_plainly_is_a_spin_gets_its_protocol() {
+    let temp = tempfile::tempdir().expect("a folder");
+    let at = temp.path();
+    let rows_s: Vec<f64> = (0..=300).map(|row| 0.05 * f64::from(row)).collect();
+    let headings: Vec<f64> = rows_s.iter().map(|t_s| (0.5 * (t_s - 1.0)).clamp(0.0, std::f64::consts::TAU)).collect();
+    let pose = |(t_s, heading): (&f64, &f64)| TruthSample::new(*t_s, 0.0, 0.0, Some(*heading));
+    let truth: Vec<TruthSample> = rows_s.iter().zip(&headings).map(pose).collect();
+    let right: Vec<f64> = headings.iter().map(|heading| 2.0 * heading).collect();
+    let wheels = Some(RecordedWheels::Angles(Wheels { left: right.iter().map(|angle| -angle).collect(), right }));
+    let run = RecordedRun { truth: &truth, rows_s: &rows_s, wheels, gyro: None, paths: Vec::new() };
+    let mut recorder = Recorder::default();
+    recorder.push(&run).expect("few topics");
+    fs::write(at.join("spin.mcap"), recorder.finish().0).expect("written");
+    imported(at, "spin.mcap", &[]);
+    let manifest = fs::read_to_string(at.join("new/dataset.toml")).expect("a manifest");
+    assert!(manifest.contains("protocol = \"spin\"\n"), "{manifest}");
 }
 
 #[test]
@@ -313,8 +346,13 @@ fn a_gyroscope_becomes_a_column_of_mean_rates_with_its_gaps() {
     let said = run_in(at, &arguments);
     let line = "gyro: /imu (sensor_msgs/msg/Imu), angular_velocity.z of imu_link, whose z is taken as up, radps, 1901 rows by header stamps (--gyro)";
     assert!(said.stdout.contains(line), "{}", said.stdout);
-    assert!(said.stdout.contains("to leave it out, delete the column gyro_radps"), "{}", said.stdout);
+    let with_poses =
+        "the gyro is in the column gyro_radps; calibrate, check and diagnose use the poses and leave it out";
+    assert!(said.stdout.lines().any(|line| line == with_poses), "{}", said.stdout);
     assert!(said.stderr.contains("topic /imu: 23 of 400 rows of the odometry have no rates"), "{}", said.stderr);
+    // It turned on the spot both ways, which is no protocol.
+    let manifest = fs::read_to_string(at.join("new/dataset.toml")).expect("a manifest");
+    assert!(!manifest.contains("protocol"), "{manifest}");
     let table = fs::read_to_string(at.join("new/odometry.csv")).expect("a table");
     assert!(table.starts_with("run,t_s,left_rad,right_rad,gyro_radps\n"), "{table}");
     let rows: Vec<Vec<&str>> = table.lines().skip(1).map(|line| line.split(',').collect()).collect();
@@ -338,6 +376,39 @@ fn a_gyroscope_becomes_a_column_of_mean_rates_with_its_gaps() {
 }
 
 #[test]
+fn wheels_and_a_gyroscope_alone_are_a_dataset_and_wheels_alone_are_none() {
+    let temp = tempfile::tempdir().expect("a folder");
+    let at = temp.path();
+    bag_with_gyro(&at.join("a.mcap"), 1e-6);
+    let import = [&["import", "ros2", "a.mcap", "--out", "new", "--force"], &ROBOT[..]].concat();
+    let without_truth = [&import[..], &["--truth", "none"]].concat();
+    let done = run_in(at, &without_truth);
+    assert_eq!(done.code, Some(0), "{}", done.stderr);
+    assert!(!done.stdout.contains("leave it out") && done.stdout.contains("401 odometry rows, 0 truth rows"));
+    assert!(!at.join("new/truth.csv").exists());
+    assert!(fs::read_to_string(at.join("new/odometry.csv")).expect("a table").contains("gyro_radps"));
+    assert_eq!(run_in(at, &["check", "new"]).code.map(|code| code < 2), Some(true));
+    let found = document(at, &[&import[..], &["--gyro", "none"]].concat());
+    assert!(found["took"]["gyro"].is_null() && found["datasets"][0]["truth_rows"] == 401, "{found}");
+    assert!(!fs::read_to_string(at.join("new/odometry.csv")).expect("a table").contains("gyro_radps"));
+    let message = refusal(at, &[&without_truth[..], &["--gyro", "none"]].concat());
+    assert!(message.contains("neither poses, nor scans, nor a gyro are taken with the wheels"), "{message}");
+    let message =
+        refusal(at, &[&["import", "ros2", &bag("zstd.mcap"), "--out", "b", "--truth", "none"], &ROBOT[..]].concat());
+    assert!(message.contains("nor a gyro") && message.contains("--gyro TOPIC"), "{message}");
+    assert!(!at.join("b").exists());
+    // Of a bag without poses the message and the list say what to type.
+    bag_of_gyro(&at.join("b.mcap"), 1e-6, false);
+    let message = refusal(at, &[&["import", "ros2", "b.mcap", "--out", "b"], &ROBOT[..]].concat());
+    assert!(message.contains("or --truth none for the wheels and the gyro /imu alone"), "{message}");
+    let command = document(at, &["import", "ros2", "b.mcap", "--list"])["command"].to_string();
+    assert!(command.contains("--wheels /joint_states --truth none --gyro /imu --wheel"), "{command}");
+    // One that measures no rate is all that there was.
+    bag_with_gyro(&at.join("a.mcap"), -1.0);
+    assert!(refusal(at, &without_truth).contains("its angular_velocity_covariance[0] is −1"));
+}
+
+#[test]
 fn a_gyroscope_that_measures_no_rate_is_refused_by_name_or_left_out() {
     let temp = tempfile::tempdir().expect("a folder");
     let at = temp.path();
@@ -358,7 +429,6 @@ fn a_gyroscope_that_measures_no_rate_is_refused_by_name_or_left_out() {
 }
 
 /// A bag as ROS 2 Humble records it: in SQLite, without definitions of its messages.
-#[cfg(feature = "db3")]
 #[test]
 fn a_bag_in_sqlite_gives_the_rows_that_are_in_it() {
     let temp = tempfile::tempdir().expect("a folder");
@@ -395,10 +465,9 @@ fn what_is_no_bag_is_named() {
     write("f.mcap.zstd", b"no zstd");
     write("g.mcap", &fs::read(bag("zstd.mcap")).expect("a bag")[..40]);
     fs::create_dir(at.join("folder")).expect("made");
-    let of_sqlite = if cfg!(feature = "db3") { "file is not a database" } else { "ros2 bag convert" };
     for (name, word) in [
-        ("a.db3", of_sqlite),
-        ("b.mcap", of_sqlite),
+        ("a.db3", "file is not a database"),
+        ("b.mcap", "file is not a database"),
         ("c.bag", "a bag of ROS 1"),
         ("d.mcap", "an empty file"),
         ("e.mcap", "no MCAP file"),

@@ -1,14 +1,12 @@
 //! `yair import ros2` of a bag with a lidar: spins at several speeds in front of a wall calibrate the
 //! wheelbase, with neither poses nor a length.
 
-use std::collections::BTreeMap;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use mcap::records::MessageHeader;
-use mcap::{WriteOptions, Writer};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use ros_bag::McapWriter;
 use serde_json::Value;
 
 use crate::support::{document, refusal, run_in, succeed};
@@ -90,36 +88,33 @@ const TRANSFORMS: &str = "geometry_msgs/TransformStamped[] transforms\n\
 
 /// A bag under way.
 struct Bag {
-    writer: Writer<fs::File>,
+    path: PathBuf,
+    writer: McapWriter,
     channels: [u16; 3],
     messages: Vec<(f64, usize, Vec<u8>)>,
 }
 
 impl Bag {
     fn new(path: &Path) -> Self {
-        let options = WriteOptions::new().profile("ros2").compression(None);
-        let mut writer = options.create(fs::File::create(path).expect("made")).expect("a bag");
+        let mut writer = McapWriter::new("ros2", "");
         let topics = [
             ("/joint_states", "sensor_msgs/msg/JointState", format!("{HEADER}{JOINT_STATE}{OF_HEADER}")),
             ("/scan", "sensor_msgs/msg/LaserScan", format!("{HEADER}{LASER_SCAN}{OF_HEADER}")),
             ("/tf_static", "tf2_msgs/msg/TFMessage", format!("{TRANSFORMS}{OF_HEADER}")),
         ];
         let channels = topics.map(|(topic, name, text)| {
-            let schema = writer.add_schema(name, "ros2msg", text.as_bytes()).expect("a schema");
-            writer.add_channel(schema, topic, "cdr", &BTreeMap::new()).expect("a channel")
+            let schema = writer.add_schema(name, "ros2msg", &text).expect("a schema");
+            writer.add_channel(schema, topic, "cdr", &[]).expect("a channel")
         });
-        Self { writer, channels, messages: Vec::new() }
+        Self { path: path.to_owned(), writer, channels, messages: Vec::new() }
     }
 
     fn finish(mut self) {
         self.messages.sort_by(|a, b| a.0.total_cmp(&b.0));
         for (sequence, (t_s, channel, bytes)) in self.messages.iter().enumerate() {
-            let time = (1e9 * t_s).round() as u64;
-            let (channel_id, sequence) = (self.channels[*channel], sequence as u32);
-            let header = MessageHeader { channel_id, sequence, log_time: time, publish_time: time };
-            self.writer.write_to_known_channel(&header, bytes).expect("written");
+            self.writer.push(self.channels[*channel], sequence as u32, (1e9 * t_s).round() as u64, bytes);
         }
-        self.writer.finish().expect("written");
+        fs::write(self.path, self.writer.finish()).expect("written");
     }
 }
 

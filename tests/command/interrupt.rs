@@ -40,7 +40,7 @@ fn interrupted(here: &Path, signal: &str, arguments: &[&str], is_time: impl Fn()
 }
 
 /// A folder that is being made has this name, beside the one that it will have.
-fn is_being_written(here: &Path) -> bool {
+pub(crate) fn is_being_written(here: &Path) -> bool {
     let names = fs::read_dir(here).expect("a folder").filter_map(Result::ok).map(|entry| entry.file_name());
     names.into_iter().any(|name| name.to_string_lossy().starts_with(".writing-"))
 }

@@ -71,6 +71,10 @@ fn gyro_tape_and_whole_turns_determine_a_robot_and_each_of_them_is_missed() {
     assert!(message.contains("determine no parameter by itself"), "{message}");
     let evaluated = run_in(folder, &["evaluate", "robot", "--calibration", "again.toml"]);
     assert!(evaluated.stdout.contains("no absolute truth"), "{} {}", evaluated.stdout, evaluated.stderr);
+    // A gate on what is not known must not pass. The table comes before it.
+    let gated = run_in(folder, &["evaluate", "robot", "--max-drift", "5", "--json"]);
+    assert_eq!(gated.code, Some(1), "{}", gated.stderr);
+    assert!(gated.stderr.contains("--max-drift: the drift of these runs is not known"), "{}", gated.stderr);
 }
 
 const BESIDE_POSES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/beside-poses.toml");

@@ -50,7 +50,12 @@ fn lines(text: &str, number: usize) -> String {
     text.lines().take(number).map(|line| format!("{line}\n")).collect()
 }
 
-type Spoil = fn(&Path);
+pub(crate) type Spoil = fn(&Path);
+
+/// The name of each way, and what does it.
+pub(crate) fn ways() -> impl Iterator<Item = (&'static str, Spoil)> {
+    TABLE.iter().map(|(name, spoil, _)| (*name, *spoil))
+}
 
 const TABLE: &[(&str, Spoil, Wanted)] = &[
     ("nothing", |_| (), Right),

@@ -165,7 +165,7 @@ fn regress_no_effect_leaps_where_rows_are_stamped_together() {
     let worst_m = |dataset: &Dataset, id: &str| {
         let variant = effects::hypothesis(id).and_then(effects::Hypothesis::into_variants)?.swap_remove(0);
         let large = variant.term.parameters().iter().map(|parameter| parameter.prior_sigma).collect();
-        let nominal = NamedCalibration { name: "nominal".to_owned(), values: BTreeMap::new() };
+        let nominal = NamedCalibration::new("nominal".to_owned(), BTreeMap::new());
         let with = AugmentedCalibration { calibration: nominal, terms: vec![variant.term], term_values: large };
         let runs = evaluate_runs(&dataset.session(), Some(&with), &EvaluationOptions::default(), &mut 0.0);
         Some(runs.iter().filter_map(|run| run.max_position_m).fold(0.0, f64::max))

@@ -42,7 +42,7 @@ fn a_report_shows_what_was_found() {
         "not round or not centred",
         "radius varies by 0.30",
         "± ",
-        "change in the drift can be told",
+        "makes no measurable difference to the drift",
         "circles with a radius of",
     ] {
         assert!(first_screen.contains(part), "no {part}: {first_screen}");

@@ -76,6 +76,7 @@ const SPECIMENS: &[[&str; 4]] = &[
         "drag_rad_m = 0.1, castor_behind_m = 0.2",
         "drag_rad_m = -0.1, castor_behind_m = 0.2",
     ],
+    ["turn_slip", "lost_share = 0.0", "lost_share = 0.1", "lost_share = -0.1"],
     ["floor_slope", "", "creep_x_m_s = 1e-3, slide_y = 2e-3", "creep_y_m_s = inf"],
     ["carpet_nap", "", "drift_x = 0.01", "yaw_sin_rad_m = nan"],
     ["encoder_cycle", "cycles = 5", "cycles = 5, left_amplitude_rad = 0.01", "cycles = 5, left_amplitude_rad = 0.2"],
@@ -232,6 +233,7 @@ const NAMES: [&[&str]; 9] = [
         "payload_compression",
         "castor_kick",
         "castor_drag",
+        "turn_slip",
         "bumps",
         "floor_slope",
         "carpet_nap",
@@ -450,6 +452,7 @@ fn both_engines_mean_the_same_by_an_effect_or_the_closed_form_refuses_it() {
         "bumps",
         "robot_displaced",
         "castor_kick",
+        "turn_slip",
         "encoder_cycle",
         "low_speed_truncation",
     ];

@@ -11,6 +11,7 @@ mod khepera_logs;
 mod one_step;
 mod partial_optiodom;
 mod published_optiodom;
+mod skid_steer;
 #[path = "../support/mod.rs"]
 mod support;
 mod with_sensor;

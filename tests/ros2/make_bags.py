@@ -17,6 +17,7 @@ import numpy as np
 import zstandard
 from mcap.writer import CompressionType, Writer as RawWriter
 from mcap_ros2.writer import Writer
+from rosbags.rosbag1 import Writer as Rosbag1
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer as Rosbag2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -73,7 +74,7 @@ def pose_stamped(t_ns, x, y, theta):
     return {"header": header(t_ns, "mocap"), "pose": {"position": {"x": round(x, 4), "y": round(y, 4), "z": 0.1}, "orientation": orientation}}
 
 
-def mcap_file(path, unindexed=False, **options):
+def mcap_file(path, unindexed=False, description=None, **options):
     """One MCAP file; log times are 3 ms after the stamps."""
     with open(path, "wb") as stream:
         writer = Writer(stream, **options)
@@ -85,6 +86,9 @@ def mcap_file(path, unindexed=False, **options):
             writer._writer.start(profile="ros2", library="mcap 1.6.0")
         joints = writer.register_msgdef("sensor_msgs/msg/JointState", JOINT_STATE)
         poses = writer.register_msgdef("geometry_msgs/msg/PoseStamped", POSE_STAMPED)
+        if description is not None:
+            text = writer.register_msgdef("std_msgs/msg/String", "string data\n")
+            writer.write_message("/robot_description", text, {"data": description}, log_time=START_NS, publish_time=START_NS)
         for number, (t_ns, left, right, x, y, theta) in enumerate(drive()):
             at = {"log_time": START_NS + t_ns + 3_000_000, "publish_time": START_NS + t_ns}
             writer.write_message("/joint_states", joints, joint_state(t_ns, left, right), **at)
@@ -185,11 +189,101 @@ def sqlite(path, version):
     shutil.rmtree(folder)
 
 
+def ros1_store():
+    """Types of ROS 1, and both of transforms."""
+    store = get_typestore(Stores.ROS1_NOETIC)
+    for name in ["tf/msg/tfMessage", "tf2_msgs/msg/TFMessage"]:
+        store.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms\n", name))
+    return store
+
+
+def ros1(path, messages):
+    """One bag of ROS 1: topic, type, nanoseconds and fields of each message; receipts are 3 ms late."""
+    path.unlink(missing_ok=True)
+    store = ros1_store()
+
+    def message(type_name, fields):
+        kinds = dict(store.fielddefs[type_name][1])
+        def of(kind, value):
+            if isinstance(value, dict):
+                return message(kind[1], {"seq": 7, **value} if kind[1] == "std_msgs/msg/Header" else value)
+            if isinstance(value, list) and value and isinstance(value[0], dict):
+                return [message(kind[1][0][1], one) for one in value]
+            if isinstance(value, list) and (not value or isinstance(value[0], float)):
+                return np.array(value, dtype=np.float64)
+            return value
+        built = {name: of(kinds[name], value) for name, value in fields.items()}
+        if type_name == "builtin_interfaces/msg/Time":
+            built = {name: int(value) for name, value in built.items()}
+        return store.types[type_name](**built)
+
+    bag = Rosbag1(path)
+    for name, format in [("lz4", Rosbag1.CompressionFormat.LZ4), ("bz2", Rosbag1.CompressionFormat.BZ2)]:
+        if name in path.name:
+            bag.set_compression(format)
+    with bag:
+        connections = {}
+        for topic, type_name, t_ns, fields in messages:
+            if topic not in connections:
+                connections[topic] = bag.add_connection(topic, type_name, typestore=store)
+            bag.write(connections[topic], START_NS + t_ns + 3_000_000, store.serialize_ros1(message(type_name, fields), type_name))
+
+
+def plain_ros1():
+    """The messages of the MCAP files."""
+    for number, (t_ns, left, right, x, y, theta) in enumerate(drive()):
+        yield "/joint_states", "sensor_msgs/msg/JointState", t_ns, joint_state(t_ns, left, right)
+        if number % 2 == 0:
+            yield "/robot/pose", "geometry_msgs/msg/PoseStamped", t_ns, pose_stamped(t_ns, x, y, theta)
+
+
+def chained_ros1():
+    """Every second row; a marker that motion capture sees, which stands on the base, and a map that is corrected every 0.5 s and published every
+    0.2 s, from which odometry leads that is wrong by 1 and 2 %."""
+    def after(a, b):
+        return [a[0] + math.cos(a[2]) * b[0] - math.sin(a[2]) * b[1], a[1] + math.sin(a[2]) * b[0] + math.cos(a[2]) * b[1], a[2] + b[2]]
+
+    def back(a):
+        return [-math.cos(a[2]) * a[0] - math.sin(a[2]) * a[1], math.sin(a[2]) * a[0] - math.cos(a[2]) * a[1], -a[2]]
+
+    def transforms(t_ns, *those):
+        of = lambda parent, child, pose: {
+            "header": header(t_ns, parent),
+            "child_frame_id": child,
+            "transform": {
+                "translation": {"x": pose[0], "y": pose[1], "z": 0.0},
+                "rotation": {"x": 0.0, "y": 0.0, "z": math.sin(pose[2] / 2), "w": math.cos(pose[2] / 2)},
+            },
+        }
+        return {"transforms": [of(*one) for one in those]}
+
+    marker = [0.1, 0.05, 0.5]
+    yield "/tf_static", "tf2_msgs/msg/TFMessage", 0, transforms(0, ("base_link", "marker", marker))
+    correction = None
+    for number, (t_ns, left, right, x, y, theta) in enumerate(drive()[::2]):
+        yield "/joint_states", "sensor_msgs/msg/JointState", t_ns, joint_state(t_ns, left, right)
+        odometry = [1.01 * x, 1.01 * y, 1.02 * theta]
+        frames = [("/odom", "/base_link", odometry), ("/mocap", "/marker", after([x, y, theta], marker))]
+        if number % 5 == 0:
+            correction = after([x, y, theta], back(odometry))
+        if number % 2 == 0 or number % 5 == 0:
+            frames.append(("/map", "/odom", correction))
+        yield "/tf", "tf/msg/tfMessage", t_ns, transforms(t_ns, *frames)
+
+
 compressed(HERE / "plain.mcap", compression=CompressionType.NONE)
 compressed(HERE / "unindexed.mcap", unindexed=True)
 mcap_file(HERE / "lz4.mcap", compression=CompressionType.LZ4, chunk_size=16384)
 mcap_file(HERE / "zstd.mcap", compression=CompressionType.ZSTD, chunk_size=16384)
+mcap_file(HERE / "described.mcap", description=(HERE / "robot.urdf").read_text(), compression=CompressionType.ZSTD, chunk_size=16384)
 rosbag2(HERE / "by_file", CompressionMode.FILE)
 rosbag2(HERE / "by_message", CompressionMode.MESSAGE, every=3)
 two_topics(HERE / "two_topics.mcap")
 sqlite(HERE / "humble.db3", version=8)
+ros1(HERE / "ros1_lz4.bag", plain_ros1())
+ros1(HERE / "ros1_bz2.bag", chained_ros1())
+# Those of fuzz/corpus/ros1: the first seconds.
+CORPUS = HERE.parent.parent / "fuzz/corpus/ros1"
+for end in ["", "_lz4", "_bz2"]:
+    ros1(CORPUS / f"poses{end}.bag", list(plain_ros1())[:40])
+ros1(CORPUS / "transforms.bag", list(chained_ros1())[:80])

@@ -52,12 +52,18 @@ pub(crate) fn refusal(folder: &Path, arguments: &[&str]) -> String {
     let ended = run_in(folder, arguments);
     let Ended { code, stdout, stderr } = ended;
     assert_eq!(code, Some(1), "{arguments:?}: {stderr}");
-    assert_eq!(stdout, "", "{arguments:?}");
     assert!(!stderr.contains("panicked"), "{stderr}");
     assert_eq!(stderr.lines().count(), 1, "{arguments:?}: {stderr}");
     // A line that a person can take in: the longest good one lists the effects that are known.
     assert!(stderr.len() < 1100, "{arguments:?}: {stderr}");
-    stderr.strip_prefix("error: ").unwrap_or_else(|| panic!("{arguments:?}: {stderr}")).trim_end().to_owned()
+    let message = stderr.strip_prefix("error: ").unwrap_or_else(|| panic!("{arguments:?}: {stderr}")).trim_end();
+    if arguments.contains(&"--json") {
+        let document: Value = serde_json::from_str(&stdout).expect("one JSON document of the failure");
+        assert_eq!(document["error"], message, "{arguments:?}");
+    } else {
+        assert_eq!(stdout, "", "{arguments:?}");
+    }
+    message.to_owned()
 }
 
 /// Runs what must be refused as bad usage: exit 2. Gives the message.

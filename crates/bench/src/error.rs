@@ -70,7 +70,7 @@ pub enum BenchError {
         path: String,
     },
     /// The folder holds an unfinished campaign that nobody asked to go on with.
-    #[error("{path}: an unfinished sweep stands there; go on with --resume, or remove that file")]
+    #[error("{path}: it holds an unfinished sweep; continue it with --resume, or remove the file")]
     Unfinished {
         /// The state file.
         path: String,

@@ -19,6 +19,7 @@ pub use moments::Moments;
 pub use sweep::{
     AccuracyCheck, Campaign, Comparison, Coverage, DriftResult, EstimatorResult, FALSE_ALARM_BUDGET, FolderLock,
     MAX_TRIALS, Merged, MethodCost, Outcome, PointResult, Progress, Quantile, Shard, SweepOptions, SweepPlan,
-    SweepResult, TRACKED, can_be_written, compare, merge, read_baseline, write_merged, write_results,
+    SweepResult, TRACKED, can_be_written, compare, figure as sweep_figure, merge, read_baseline, write_merged,
+    write_results,
 };
 pub use trial::Trial;

@@ -105,7 +105,7 @@ const GUARDS: [(&str, &str, Fails); 5] = [
     ("wrong_first_name", "wrong names first, of detected effects without an alias", |case| {
         is_first_name_right(case).map(|is_right| !is_right)
     }),
-    ("uncovered", "effects found of which an interval does not cover", |case| {
+    ("uncovered", "effects found with an interval that does not cover", |case| {
         let mut covered = case.reported.iter().flat_map(|reported| &reported.covered).peekable();
         covered.peek().is_some().then(|| !covered.all(|covered| *covered))
     }),

@@ -27,12 +27,12 @@ pub enum EffectKind {
 }
 
 /// Ids that can be hidden, with their kinds: the catalogue without the geometry, what is silent,
-/// and what needs a length that the robots do not have.
+/// and what needs what the robots do not have.
 pub(crate) fn hideable() -> Vec<(&'static str, EffectKind)> {
-    let needs_length = |id: &str| description(id).is_some_and(|of| of.benchmark.needs.length);
+    let needs_others = |id: &str| description(id).is_some_and(|of| of.benchmark.needs.others);
     CATALOGUE
         .iter()
-        .filter(|id| !needs_length(id))
+        .filter(|id| !needs_others(id))
         .filter_map(|id| match hypothesis(id)? {
             Hypothesis::Terms(_) => Some((*id, EffectKind::Mean)),
             Hypothesis::Scatter(_) | Hypothesis::TermsAndScatter(..) => Some((*id, EffectKind::Scatter)),

@@ -168,6 +168,23 @@ pub enum CaseOutcome {
     NeverShown(String),
 }
 
+/// Whether a scope drives the case of a number.
+fn is_driven(scope: Scope, number: u64) -> bool {
+    scope != Scope::Guarded || case_kind::is_guarded(number)
+}
+
+/// Whether outcomes are those of a scope's cases with these numbers, one each and in their order.
+#[must_use]
+pub fn are_outcomes_of(outcomes: &[CaseOutcome], numbers: Range<u64>, scope: Scope) -> bool {
+    let mut driven = numbers.filter(|number| is_driven(scope, *number));
+    let is_next = |outcome: &CaseOutcome| match (driven.next(), outcome) {
+        (Some(number), CaseOutcome::Scored(result)) => result.case == number,
+        (number, CaseOutcome::NeverShown(_)) => number.is_some(),
+        (None, CaseOutcome::Scored(_)) => false,
+    };
+    outcomes.iter().all(is_next) && driven.next().is_none()
+}
+
 /// Drives the cases of a scope on so many threads, 0 for one a core, and scores them; `done` is called after
 /// each.
 ///
@@ -197,7 +214,6 @@ pub fn challenge_outcomes(
 ) -> Result<Vec<CaseOutcome>, ChallengeError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build();
     let pool = pool.map_err(|error| ChallengeError::Threads { jobs, why: error.to_string() })?;
-    let is_included = |number: &u64| scope != Scope::Guarded || case_kind::is_guarded(*number);
     let one = |number| {
         let result = challenge_case(scope, seed, number);
         done();
@@ -206,7 +222,7 @@ pub fn challenge_outcomes(
             Err(id) => CaseOutcome::NeverShown(id.to_owned()),
         })
     };
-    pool.install(|| numbers.into_par_iter().filter(is_included).map(one).collect())
+    pool.install(|| numbers.into_par_iter().filter(|number| is_driven(scope, *number)).map(one).collect())
 }
 
 impl ChallengeResult {

@@ -147,7 +147,7 @@ fn large(cases: &[CaseResult]) -> Vec<Measure> {
         ),
         share(
             "second_finding",
-            "large effects with a second finding beside them",
+            "large effects with a second finding",
             count(large.iter().copied(), |case: &CaseResult| case.findings().nth(1).is_some()),
             0.1,
             true,
@@ -290,7 +290,7 @@ fn resolved(cases: &[CaseResult]) -> [Measure; 2] {
     let can = of.len();
     let detectability = share(
         "sets_that_can_be_told",
-        "sets that the oracle could tell after more runs (shown only)",
+        "sets that the oracle could resolve after more runs (shown only)",
         (can, sets().count()),
         0.0,
         false,
@@ -298,7 +298,7 @@ fn resolved(cases: &[CaseResult]) -> [Measure; 2] {
     [
         share(
             "resolved",
-            "sets that can be told: the right name alone after the planned runs",
+            "sets that can be resolved: the right name alone after the planned runs",
             count(of.iter(), alone),
             0.9,
             false,

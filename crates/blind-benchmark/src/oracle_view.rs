@@ -1,5 +1,7 @@
 //! What the oracle knows of a hidden effect: noncentrality, ratio to the detection limit, aliases.
 
+use dataset::{Number, checked};
+
 use crate::hidden::{EffectKind, Hidden};
 use crate::oracle::Detectability;
 use crate::power::{DISCRIMINATION_LEVEL, detection_limit};
@@ -14,24 +16,29 @@ pub struct OracleView {
     /// Whether it acts in another functional form than the catalogue's.
     pub other_form: bool,
     /// Sizes by the hypothesis's names, shape parameters after them.
-    #[serde(rename = "sizes")]
+    #[serde(rename = "sizes", deserialize_with = "checked::<Vec<(String, Number)>, _>")]
     pub values: Vec<(String, f64)>,
     /// Noncentrality of the test that knows it; beside another hidden effect, with that in the model. `None`
     /// for gross faults.
+    #[serde(default, deserialize_with = "checked::<Option<Number>, _>")]
     pub noncentrality: Option<f64>,
     /// Its size over the smallest that this test finds with power 0.9. `None` for gross faults.
+    #[serde(default, deserialize_with = "checked::<Option<Number>, _>")]
     pub ratio: Option<f64>,
     /// How much of its signature's χ² its hypothesis takes up: 1 where that has its form. `None` for gross
     /// faults and scatter.
+    #[serde(default, deserialize_with = "checked::<Option<Number>, _>")]
     pub form_share: Option<f64>,
     /// Noncentrality of the best test between it and each other name whose sizes can be, the least first:
     /// what the other name leaves of it. Empty for gross faults.
+    #[serde(deserialize_with = "checked::<Vec<(String, Number)>, _>")]
     pub rivals: Vec<(String, f64)>,
     /// The other names that this test does not tell from it with power 0.9; of a gross fault, those whose
     /// corrections leave as little.
     pub aliases: Vec<String>,
     /// Share of the noncentrality that the rounding of the counts takes; `None` where rounding does not
     /// matter, and of what is no mean.
+    #[serde(default, deserialize_with = "checked::<Option<Number>, _>")]
     pub rounding_share: Option<f64>,
 }
 

@@ -1,5 +1,6 @@
 //! What came of a case: what was found, and what the planned run made of it.
 
+use dataset::{Number, Share, checked};
 use diagnose::Document;
 use effects::OrdinaryCondition;
 
@@ -17,13 +18,16 @@ pub struct Reported {
     /// Its names, most probable first.
     pub names: Vec<String>,
     /// Stated probability of the first name.
+    #[serde(deserialize_with = "checked::<Share, _>")]
     pub probability: f64,
     /// Its z.
+    #[serde(deserialize_with = "checked::<Number, _>")]
     pub z: f64,
     /// Where the first name is right and of the catalogue's form: for each size, whether its stated 95 %
     /// interval holds the truth.
     pub covered: Vec<bool>,
     /// The same estimates' errors over their stated standard deviations.
+    #[serde(deserialize_with = "checked::<Vec<Number>, _>")]
     pub errors: Vec<f64>,
     /// Its sentence.
     pub sentence: String,
@@ -66,10 +70,11 @@ pub struct CaseResult {
     /// Whether the mean was extended.
     pub extended: bool,
     /// Gain in log score on the held-out log: of the tool, and of who knows the true term.
+    #[serde(default, deserialize_with = "checked::<Option<[Number; 2]>, _>")]
     pub gain: Option<[f64; 2]>,
     /// Of an extended model on a session of other paths, speed and acceleration: its gain in log score over
     /// the calibration alone, over the standard deviation that errors of measurements give the gain.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "checked::<Option<Number>, _>")]
     pub other_session: Option<f64>,
     /// Where its effect was found among several names: what the planned run made of them.
     pub planned: Option<Planned>,

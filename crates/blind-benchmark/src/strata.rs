@@ -1,6 +1,7 @@
 //! Strata: what a case's robot and records are like, in few levels each, so that every measure can be told
 //! for each of them. The numbers that were drawn stand beside.
 
+use dataset::{NotNegative, Number, Positive, Share, checked};
 use effects::OrdinaryCondition;
 
 use super::case::Case;
@@ -210,31 +211,44 @@ pub struct Strata {
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct DrawnConditions {
     /// Wheelbase, metres.
+    #[serde(deserialize_with = "checked::<Positive, _>")]
     pub wheel_separation_m: f64,
     /// Wheel diameter, metres.
+    #[serde(deserialize_with = "checked::<Positive, _>")]
     pub wheel_diameter_m: f64,
     /// Ticks for a turn of a wheel.
+    #[serde(deserialize_with = "checked::<Positive, _>")]
     pub ticks_per_turn: f64,
     /// Way of a wheel for a tick, metres.
+    #[serde(deserialize_with = "checked::<Positive, _>")]
     pub tick_m: f64,
     /// Rows a second.
+    #[serde(deserialize_with = "checked::<Positive, _>")]
     pub log_rate_hz: f64,
     /// Standard deviation of a stamp's error, seconds.
+    #[serde(deserialize_with = "checked::<NotNegative, _>")]
     pub stamp_sigma_s: f64,
     /// Share of the rows that are missing.
+    #[serde(deserialize_with = "checked::<Share, _>")]
     pub lost_row_share: f64,
     /// By how much the instrument's clock gains on the robot's, seconds a second.
+    #[serde(deserialize_with = "checked::<Number, _>")]
     pub clock_drift: f64,
     /// Measurements a second.
+    #[serde(deserialize_with = "checked::<NotNegative, _>")]
     pub truth_rate_hz: f64,
     /// Standard deviation of a measured coordinate, metres.
+    #[serde(deserialize_with = "checked::<NotNegative, _>")]
     pub sigma_xy_m: f64,
     /// Standard deviation of a measured heading, radians.
+    #[serde(deserialize_with = "checked::<NotNegative, _>")]
     pub sigma_theta_rad: f64,
     /// Random walk of a wheel's travel, m/√m.
+    #[serde(deserialize_with = "checked::<NotNegative, _>")]
     pub wheel_sigma_m_per_sqrt_m: f64,
     /// Share of the speed by which the shafts are disturbed, and how often a second; `None` where they are
     /// not.
+    #[serde(default, deserialize_with = "checked::<Option<(NotNegative, NotNegative)>, _>")]
     pub ripple: Option<(f64, f64)>,
     /// Rows of the log.
     pub rows: usize,

@@ -94,9 +94,7 @@ pub struct Refusal {
 
 /// Sessions cannot be compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "comparing needs two sessions or more, for a calibration is evaluated on sessions that it has not seen; there is {0}"
-)]
+#[error("comparing needs two sessions or more, since a calibration is evaluated on other sessions; there is {0}")]
 pub struct TooFewSessions(pub usize);
 
 /// The kind of path that a session drives: `squares`, `straights + spins`, …; `mixed` for more than two

@@ -78,21 +78,26 @@ impl DeadReckoned {
     }
 }
 
+/// Why the scale common to all lengths is open.
+pub(crate) const ON_THE_SPOT: &str =
+    "the runs only turn on the spot, or close: add straight runs, or measurements along the path";
+/// Why a wheel is open.
+pub(crate) const WHEEL_HARDLY_TURNS: &str = "that wheel hardly turns: add straight runs, and turns to both sides";
+/// Why the separation is open.
+pub(crate) const HARDLY_TURN: &str = "the runs hardly turn: add spins, arcs or squares";
+
 /// The parameter that a direction in relative left wheel, right wheel and separation stands for, and what to
 /// drive where it is not observable.
 pub(crate) fn unobservable(direction: &Vector3<f64>) -> (Parameter, &'static str) {
     let sizes = direction.normalize().abs();
     // All three grow together: every turn stays, every length grows.
     if sizes.min() > MIN_COMMON_SCALE_COMPONENT {
-        (
-            Parameter::CommonScale,
-            "the runs only turn on the spot, or close: add straight runs, or measurements along the path",
-        )
+        (Parameter::CommonScale, ON_THE_SPOT)
     } else {
         match sizes.imax() {
-            0 => (Parameter::LeftWheelDiameter, "that wheel hardly turns: add straight runs, and turns to both sides"),
-            1 => (Parameter::RightWheelDiameter, "that wheel hardly turns: add straight runs, and turns to both sides"),
-            _ => (Parameter::WheelSeparation, "the runs hardly turn: add spins, arcs or squares"),
+            0 => (Parameter::LeftWheelDiameter, WHEEL_HARDLY_TURNS),
+            1 => (Parameter::RightWheelDiameter, WHEEL_HARDLY_TURNS),
+            _ => (Parameter::WheelSeparation, HARDLY_TURN),
         }
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Each run starts from its first truth pose, is dead-reckoned (`trajectory.rs`) and is compared at the
 //! truth's instants; between two rows of the log the pose is interpolated along the chord. Instants outside
-//! of the log are left out.
+//! of the log are left out. `without_start.rs` has runs without measured poses.
 
 use dataset::{RunView, Session};
 use kinematics::{Pose, wrap_to_pi};
@@ -10,6 +10,7 @@ use serde::Serialize;
 
 use crate::named_calibration::NamedCalibration;
 use crate::pose_error::{PathErrors, PoseErrorOptions, PoseErrorStatistics, PoseErrors};
+use crate::starts_by::StartsBy;
 use crate::trajectory::{AugmentedCalibration, RunPath, Trajectory, at};
 
 /// Drift of every run under one calibration.
@@ -17,6 +18,9 @@ use crate::trajectory::{AugmentedCalibration, RunPath, Trajectory, at};
 pub struct CalibrationDrift {
     /// The calibration's name; `nominal` for what the robot believes.
     pub name: String,
+    /// Where the place and the latency of the instrument are from; `None` where it is at the drive's centre.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mounting_from: Option<String>,
     /// Run by run.
     pub runs: Vec<RunDrift>,
     /// Largest position error at any instant of any run, metres.
@@ -64,6 +68,9 @@ pub struct RunDrift {
     pub ape: Option<PoseErrorStatistics>,
     /// Relative pose errors.
     pub rpe: Option<PoseErrorStatistics>,
+    /// How it starts without a measured pose.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub starts_by: Option<StartsBy>,
     /// The errors themselves, for the statistics over all runs.
     #[serde(skip)]
     path_errors: Option<PathErrors>,
@@ -130,6 +137,7 @@ fn dead_reckoned<T>(
     let of = |run| {
         let (mut drift, kept) = match Trajectory::under(session, run, calibration, driven_m) {
             Some(trajectory) => {
+                let trajectory = trajectory.beside_parts_of_poses(run, calibration.map(|of| &of.calibration));
                 let kept = keep(run, &trajectory);
                 (run_drift(run, trajectory, options.pose_errors.as_ref()), Some(kept))
             }
@@ -158,6 +166,7 @@ pub fn evaluate_path(
     let Some(mut trajectory) = Trajectory::under(session, run, Some(calibration), driven_m) else {
         return unknown(run, 0.0, "the calibration has no value that this robot's geometry needs");
     };
+    trajectory = trajectory.beside_parts_of_poses(run, Some(&calibration.calibration));
     let (Ok(moved), Some((_, first)), Some((t_s, measured))) =
         (trajectory.moved, trajectory.log.first(), trajectory.measured.first().copied())
     else {
@@ -200,13 +209,15 @@ fn unknown(run: &RunView<'_>, length_m: f64, why: &'static str) -> RunDrift {
         final_heading_rad: None,
         ape: None,
         rpe: None,
+        starts_by: None,
         path_errors: None,
         why_null: Some(why),
     }
 }
 
 fn run_drift(run: &RunView<'_>, trajectory: Trajectory, pose_errors: Option<&PoseErrorOptions>) -> RunDrift {
-    let Trajectory { log, length_m, measured, moved } = trajectory;
+    let Trajectory { log, length_m, measured, moved, starts_by } = trajectory;
+    let has_headings = starts_by != Some(StartsBy::FirstTenth);
     let moved = match moved {
         Ok(moved) => moved,
         Err(why) => return unknown(run, length_m, why),
@@ -236,7 +247,10 @@ fn run_drift(run: &RunView<'_>, trajectory: Trajectory, pose_errors: Option<&Pos
     if !ends.chain([length_m]).all(is_number) {
         return unknown(run, 0.0, "its lengths are beyond the range of numbers: look for a wrong unit or count");
     }
-    let path_errors = pose_errors.map(|options| PathErrors::of(&reference, &estimate, options));
+    let path_errors = pose_errors
+        .map(|options| PathErrors::of(&reference, &estimate, options))
+        .map(|errors| if has_headings { errors } else { errors.of_positions() });
+    let heading = |of: Option<(f64, f64)>| of.filter(|_| has_headings).map(|(_, heading_rad)| heading_rad);
     let statistics = |of: fn(&PathErrors) -> &Result<PoseErrors, &'static str>| {
         path_errors.as_ref().map(|errors| PoseErrorStatistics::of(of(errors).as_ref().map_err(|why| *why)))
     };
@@ -245,11 +259,12 @@ fn run_drift(run: &RunView<'_>, trajectory: Trajectory, pose_errors: Option<&Pos
         run: run.info().id.clone(),
         length_m,
         max_position_m: largest.map(|largest| largest.0),
-        max_heading_rad: largest.map(|largest| largest.1),
+        max_heading_rad: heading(largest),
         final_position_m: last.map(|last| last.0),
-        final_heading_rad: last.map(|last| last.1),
+        final_heading_rad: heading(last),
         ape: statistics(|errors| &errors.absolute),
         rpe: statistics(|errors| &errors.relative),
+        starts_by,
         path_errors,
         why_null: None,
     }
@@ -288,6 +303,7 @@ fn summarise(name: String, runs: Vec<RunDrift>) -> CalibrationDrift {
     };
     CalibrationDrift {
         name,
+        mounting_from: None,
         ape: pooled(|errors| &errors.absolute),
         rpe: pooled(|errors| &errors.relative),
         max_position_m: largest(|run| run.max_position_m),
@@ -373,7 +389,7 @@ mod tests {
         let mut values: std::collections::BTreeMap<String, f64> =
             [("left_m_per_tick".to_owned(), 1.02e-3), ("right_m_per_tick".to_owned(), 1.02e-3)].into();
         values.insert("sensor_theta_rad".to_owned(), 0.2);
-        let calibration = NamedCalibration { name: "right".to_owned(), values };
+        let calibration = NamedCalibration::new("right".to_owned(), values);
         let dataset = dataset(truth(Some(std::f64::consts::FRAC_PI_2 + 0.2)));
         let drift = evaluate(&[dataset.session()], Some(&calibration), true);
         assert!(drift.max_position_m.expect("poses") < 1e-14);
@@ -383,11 +399,40 @@ mod tests {
 
     #[test]
     fn what_the_truth_cannot_give_is_null_with_a_reason() {
-        for (dataset, reason) in [(dataset(truth(None)), "position-only"), (dataset(Vec::new()), "no absolute truth")] {
+        // Positions of a robot that stands have no heading to start from.
+        let standing = [0.0, 5.0, 10.0].map(|t_s| TruthSample::new(t_s, 5.0, 1.0, None)).to_vec();
+        for (dataset, reason) in [(dataset(standing), "does not move"), (dataset(Vec::new()), "no absolute truth")] {
             let drift = evaluate(&[dataset.session()], None, false);
             assert_eq!((drift.drift_percent, drift.max_position_m), (None, None));
             assert!(drift.why_null.expect("a reason").contains(reason));
             assert!(drift.runs[0].why_null.expect("a reason").contains(reason));
         }
+    }
+
+    #[test]
+    fn positions_alone_drift_from_the_heading_of_their_first_tenth() {
+        // Along y, 2 % longer than by the counts, in steps of a twentieth.
+        let positions = (0..=20).map(|k| TruthSample::new(0.5 * f64::from(k), 5.0, 1.0 + 0.051 * f64::from(k), None));
+        let dataset = dataset(positions.collect());
+        let options = EvaluationOptions { name_runs: false, pose_errors: Some(PoseErrorOptions::default()) };
+        let runs = evaluate_runs(&dataset.session(), None, &options, &mut 0.0);
+        // The mean of the first tenth, at a twentieth, is where the path is laid on.
+        assert!((runs[0].final_position_m.expect("positions") - 0.02 * 0.95).abs() < 1e-12, "{:?}", runs[0]);
+        assert_eq!((runs[0].final_heading_rad, runs[0].max_heading_rad), (None, None));
+        let ape = runs[0].ape.as_ref().expect("wanted");
+        assert!(ape.translation_m.is_some() && ape.rotation_rad.is_none(), "{ape:?}");
+        assert!(runs[0].rpe.as_ref().expect("wanted").why_null.is_some());
+    }
+
+    #[test]
+    fn motions_alone_are_chained_and_what_none_of_them_saw_is_the_paths() {
+        let mut dataset = dataset(Vec::new());
+        // Two of 0.4 m, each 2 % longer, and 0.2 m between them that nothing saw; one begins too early.
+        dataset.runs[0].displacements = [(0.0, 4.0, 0.408), (3.0, 5.0, 9.0), (6.0, 10.0, 0.408)]
+            .map(|(t0_s, t1_s, dx_m)| dataset::Displacement { t0_s, t1_s, dx_m, dy_m: 0.0, dtheta_rad: 0.0 })
+            .to_vec();
+        let drift = evaluate(&[dataset.session()], None, false);
+        assert!((drift.drift_percent.expect("chained") - 1.6).abs() < 1e-9, "{drift:?}");
+        assert!(drift.runs[0].final_heading_rad.expect("chained") < 1e-12);
     }
 }

@@ -1,5 +1,7 @@
 //! What a calibration is: the trait of a method and the form of its result.
 
+use std::borrow::Cow;
+
 use dataset::{LANES, NominalRobot, NotNegative, Number, Replicates, Session, checked};
 use kinematics::{DriveGeometry, GeometryError, Pose, Wheels};
 use motion_programs::Schedule;
@@ -8,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use estimation::{EstimationError, OneStep, WrappedCounter};
 
-use crate::settings::{MAX_PLAUSIBLE_DIAMETER_RATIO, MAX_PLAUSIBLE_SEPARATION_RATIO};
+use crate::settings::{MAX_PLAUSIBLE_DIAMETER_RATIO, MAX_PLAUSIBLE_SEPARATION_RATIO, MAX_UNREMARKED_RATIO};
 
 /// A quantity that calibration estimates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -63,8 +65,14 @@ impl Parameter {
         Self::RightPerTick,
     ];
 
+    /// The lengths of a drive: left diameter, right diameter, separation.
+    pub const LENGTHS: [Self; 3] = [Self::LeftWheelDiameter, Self::RightWheelDiameter, Self::WheelSeparation];
+
     /// The parameters of [`Extrinsics`], in the order of its covariance.
     pub const EXTRINSICS: [Self; 3] = [Self::SensorX, Self::SensorY, Self::SensorTheta];
+
+    /// The parameters of an instrument: [`Self::EXTRINSICS`] and its latency.
+    pub const INSTRUMENT: [Self; 4] = [Self::SensorX, Self::SensorY, Self::SensorTheta, Self::Latency];
 }
 
 /// A value with its standard deviation.
@@ -111,6 +119,13 @@ pub struct GroupInstrument {
     pub latency_s: Option<f64>,
 }
 
+impl GroupInstrument {
+    /// One of which nothing is known.
+    pub(crate) fn new(of: &str) -> Self {
+        Self { of: of.to_owned(), sensor_x_m: None, sensor_y_m: None, sensor_theta_rad: None, latency_s: None }
+    }
+}
+
 /// Noise of the odometry, for methods that estimate it: variances grow with what was driven, not with time
 /// (Chong & Kleeman 1997).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -133,7 +148,7 @@ pub struct NotObservable {
     /// Which.
     pub parameter: Parameter,
     /// Why, and what would show it.
-    pub why: &'static str,
+    pub why: Cow<'static, str>,
 }
 
 /// A run that was left out.
@@ -165,6 +180,9 @@ pub struct Calibration {
     pub latency_s: Option<(f64, Option<f64>)>,
     /// Extrinsics and latencies of sessions or runs that have their own; the two above are then their means.
     pub group_instruments: Vec<GroupInstrument>,
+    /// What the fit saw beside the values, a sentence each: instruments that differ between sessions,
+    /// distance that is lost in turns.
+    pub seen: Vec<String>,
     /// Noise of the odometry; `None` for methods that do not estimate it.
     pub noise: Option<OdometryNoise>,
     /// What the data do not determine.
@@ -192,6 +210,7 @@ impl Calibration {
             extrinsics: None,
             latency_s: None,
             group_instruments: Vec::new(),
+            seen: Vec::new(),
             noise: None,
             not_observable: Vec::new(),
             runs_used: 0,
@@ -251,6 +270,29 @@ impl Calibration {
             is_implausible(parameter, factor).then(message)
         };
         nominal.into_iter().filter_map(remark).collect()
+    }
+
+    /// Remarks on lengths that are far from the stated ones and may be right.
+    #[must_use]
+    pub fn remarks(&self, robot: &NominalRobot) -> Vec<String> {
+        let stated = [
+            (Parameter::LeftWheelDiameter, robot.left_wheel_diameter_m),
+            (Parameter::RightWheelDiameter, robot.right_wheel_diameter_m),
+            (Parameter::WheelSeparation, robot.wheel_separation_m),
+        ];
+        let remark = |(parameter, stated_m): (Parameter, f64)| {
+            let is_open = self.not_observable.iter().any(|blind| blind.parameter == parameter);
+            let factor = self.estimate(parameter)?.value / stated_m;
+            let is_far = is_off(parameter, factor, [MAX_UNREMARKED_RATIO; 2]) && !is_implausible(parameter, factor);
+            let readings = if parameter == Parameter::WheelSeparation {
+                "either the stated one or the driver's formula is off (ω = (r − l)/2b makes a factor of 2), or the \
+                 robot skids in turns, as four-wheeled and tracked robots do: then it is the right one for odometry"
+            } else {
+                "look for a radius, a gear or ticks_per_rev, and for tyres under load"
+            };
+            (is_far && !is_open).then(|| format!("{} is {factor:.3} times the stated one: {readings}", parameter.key()))
+        };
+        stated.into_iter().filter_map(remark).chain(self.seen.clone()).collect()
     }
 
     /// Every value that the method has.

@@ -12,6 +12,8 @@ mod dead_reckoning_jacobian;
 mod drift;
 mod drive;
 mod estimate;
+mod evaluated_instrument;
+mod log_check;
 mod named_calibration;
 mod path_covariance;
 mod pose_error;
@@ -21,10 +23,13 @@ mod report;
 mod robust;
 mod robust_lanes;
 mod settings;
+mod starts_by;
 mod stated;
 mod trained_on;
 mod trajectory;
+mod turn_loss;
 mod withheld;
+mod without_start;
 
 pub mod methods;
 
@@ -40,6 +45,8 @@ pub use estimate::{
     CalibError, Calibration, Covariance, Estimate, Extrinsics, GroupInstrument, Method, NotObservable, OdometryNoise,
     Parameter, Rejected,
 };
+pub use evaluated_instrument::{EvaluatedInstrument, with_instrument};
+pub use log_check::check_and_fit;
 pub use methods::{METHODS, method};
 pub use named_calibration::NamedCalibration;
 pub use path_covariance::path_covariances;
@@ -51,6 +58,7 @@ pub use report::{
     CalibrationReport, MethodReport, Names, ReportError, ReportedBlindness, ReportedRejection, ReportedValue,
 };
 pub use robust::{MedianMad, Summary};
+pub use starts_by::StartsBy;
 pub use stated::nominal_value;
 pub use trained_on::TrainedOn;
 pub use trajectory::{AugmentedCalibration, CorrectedRun, RunPath, corrected_run};

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use dataset::NominalRobot;
 use kinematics::{DriveGeometry, Pose, Wheels};
 
-use crate::estimate::{Parameter, is_implausible, is_off};
+use crate::estimate::{GroupInstrument, Parameter, is_implausible, is_off};
 use crate::settings::{MAX_EVALUATED_DIAMETER_RATIO, MAX_EVALUATED_SEPARATION_RATIO};
 
 /// A named set of values for dead reckoning.
@@ -15,9 +15,31 @@ pub struct NamedCalibration {
     pub name: String,
     /// Values by key.
     pub values: BTreeMap<String, f64>,
+    /// Instruments of the sessions that it was found on, where these have their own.
+    pub own_instruments: Vec<GroupInstrument>,
 }
 
 impl NamedCalibration {
+    /// Values by their keys, of an instrument that is the same in all sessions.
+    #[must_use]
+    pub const fn new(name: String, values: BTreeMap<String, f64>) -> Self {
+        Self { name, values, own_instruments: Vec::new() }
+    }
+
+    /// The same with the instrument of a session, by its name, where sessions have their own: a session that
+    /// it was not found on has none that is known.
+    #[must_use]
+    pub fn in_session(mut self, session: &str) -> Self {
+        if let Some(own) = self.own_instruments.iter().find(|own| own.of == session) {
+            let own = [own.sensor_x_m, own.sensor_y_m, own.sensor_theta_rad, own.latency_s];
+            let own = Parameter::INSTRUMENT.into_iter().zip(own);
+            self.values.extend(own.filter_map(|(of, value)| Some((of.key().to_owned(), value?))));
+        } else if !self.own_instruments.is_empty() {
+            self.values.retain(|key, _| !Parameter::INSTRUMENT.iter().any(|of| of.key() == key));
+        }
+        self
+    }
+
     /// The drive for a robot: missing values stay nominal; a diameter missing beside a travel per tick
     /// follows from it.
     #[must_use]
@@ -101,8 +123,7 @@ mod tests {
     #[test]
     fn what_a_calibration_does_not_say_stays_nominal() {
         let robot = ROBOT;
-        let calibration =
-            NamedCalibration { name: "x".to_owned(), values: [("left_m_per_tick".to_owned(), 3e-4)].into() };
+        let calibration = NamedCalibration::new("x".to_owned(), [("left_m_per_tick".to_owned(), 3e-4)].into());
         let geometry = calibration.geometry(&robot, robot.geometry().expect("valid")).expect("valid");
         assert_eq!(geometry.wheel_diameter_m().left, 0.3 / std::f64::consts::PI);
         assert_eq!(geometry.wheel_diameter_m().right, 0.09);
@@ -113,13 +134,13 @@ mod tests {
     fn values_far_from_the_nominal_ones_are_of_another_robot_and_farther_ones_of_none() {
         let said = |key: &str, value: f64| {
             let values = BTreeMap::from([(key.to_owned(), value)]);
-            let found = NamedCalibration { name: "x".to_owned(), values };
+            let found = NamedCalibration::new("x".to_owned(), values);
             (found.other_robot(&ROBOT).is_some(), found.implausible_for(&ROBOT).is_some())
         };
         for (key, nominal_m, limits) in [
             ("left_wheel_diameter_m", 0.08, [MAX_EVALUATED_DIAMETER_RATIO, 1.3]),
             ("right_wheel_diameter_m", 0.09, [MAX_EVALUATED_DIAMETER_RATIO, 1.3]),
-            ("wheel_separation_m", 0.2, [MAX_EVALUATED_SEPARATION_RATIO, 2.2]),
+            ("wheel_separation_m", 0.2, [MAX_EVALUATED_SEPARATION_RATIO, 4.0]),
         ] {
             let at = |ratio: f64| [said(key, nominal_m * ratio), said(key, nominal_m / ratio)];
             assert_eq!(at(0.99 * limits[0]), [(false, false); 2], "{key}");

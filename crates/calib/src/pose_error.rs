@@ -154,6 +154,12 @@ impl PathErrors {
             relative: relative_pose_errors(reference, estimate, &options.delta),
         }
     }
+
+    /// The same of positions without headings, beside which the reference has those of the estimate.
+    pub(crate) fn of_positions(self) -> Self {
+        let absolute = self.absolute.map(|errors| PoseErrors { rotation_rad: Vec::new(), ..errors });
+        Self { absolute, relative: Err("positions without headings show no motion of a pose") }
+    }
 }
 
 #[cfg(test)]

@@ -114,6 +114,9 @@ pub struct MethodReport {
     /// Implausible values, and what to check.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
+    /// Values far from the stated ones that may be right, and instruments that moved between sessions.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub remarks: Vec<String>,
 }
 
 /// A value with its standard deviation. A bare number is read as a value without one.
@@ -206,15 +209,26 @@ impl MethodReport {
             one_step: None,
             converged: false,
             warnings: Vec::new(),
+            remarks: Vec::new(),
         };
         let calibration = match outcome {
             Ok(calibration) => calibration,
             Err(error) => return Self { error: Some(error.to_string()), ..empty },
         };
-        let value = |estimate: crate::Estimate| ReportedValue {
-            ratio_to_nominal: nominal_value(nominal, estimate.parameter.key()).map(|nominal| estimate.value / nominal),
-            sigma_why_null: estimate.sigma.is_none().then(|| "too few runs to show a scatter".to_owned()),
-            ..ReportedValue::of(estimate.value, estimate.sigma)
+        // What is not determined keeps its stated value, which nothing measured.
+        let is_open = |parameter| calibration.not_observable.iter().any(|blind| blind.parameter == parameter);
+        let value = |estimate: crate::Estimate| {
+            let (sigma, why) = match estimate.sigma {
+                Some(_) if is_open(estimate.parameter) => (None, Some("these runs do not determine it")),
+                Some(sigma) => (Some(sigma), None),
+                None => (None, Some("too few runs to show a scatter")),
+            };
+            ReportedValue {
+                ratio_to_nominal: nominal_value(nominal, estimate.parameter.key())
+                    .map(|nominal| estimate.value / nominal),
+                sigma_why_null: why.map(str::to_owned),
+                ..ReportedValue::of(estimate.value, sigma)
+            }
         };
         Self {
             parameters: calibration
@@ -228,7 +242,7 @@ impl MethodReport {
                 .iter()
                 .map(|blind| ReportedBlindness {
                     parameter: blind.parameter.key().to_owned(),
-                    why: blind.why.to_owned(),
+                    why: blind.why.to_string(),
                 })
                 .collect(),
             runs_used: calibration.runs_used,
@@ -240,6 +254,7 @@ impl MethodReport {
             one_step: calibration.one_step,
             converged: calibration.converged,
             warnings: calibration.plausibility_warnings(nominal),
+            remarks: calibration.remarks(nominal),
             ..empty
         }
     }
@@ -282,8 +297,7 @@ impl CalibrationReport {
         })?;
         for method in &report.methods {
             for (key, value) in method.parameters.iter().filter_map(|(key, value)| Some((key, value.value?))) {
-                let is_length =
-                    !Parameter::EXTRINSICS.iter().chain([&Parameter::Latency]).any(|of| of.key() == key.as_str());
+                let is_length = !Parameter::INSTRUMENT.iter().any(|of| of.key() == key.as_str());
                 let is_value =
                     if is_length { Positive::try_from(value).is_ok() } else { Number::try_from(value).is_ok() };
                 if !is_value || !KNOWN_KEYS.contains(&key.as_str()) {
@@ -302,12 +316,19 @@ impl CalibrationReport {
     /// The calibrations in the file that have values, each under the name of its method.
     #[must_use]
     pub fn calibrations(&self) -> Vec<NamedCalibration> {
+        // Those of single runs are summed up in the values.
+        let are_of_sessions = |own: &[GroupInstrument]| match &self.dataset {
+            Names::One(_) => false,
+            Names::Several(sessions) => own.iter().all(|own| sessions.contains(&own.of)),
+        };
+        let of_sessions = |own: &Vec<GroupInstrument>| if are_of_sessions(own) { own.clone() } else { Vec::new() };
         self.methods
             .iter()
             .filter(|method| method.error.is_none())
             .map(|method| NamedCalibration {
                 name: method.method.clone(),
                 values: method.parameters.iter().filter_map(|(key, value)| Some((key.clone(), value.value?))).collect(),
+                own_instruments: of_sessions(&method.group_instruments),
             })
             .collect()
     }
@@ -359,6 +380,7 @@ mod tests {
                 one_step: Some(OneStep { measurements: 1_000_000, first_measurements: 65_536, passes: 1 }),
                 converged: true,
                 warnings: Vec::new(),
+                remarks: Vec::new(),
             }],
         }
     }

@@ -12,6 +12,15 @@ use std::f64::consts::{FRAC_PI_2, PI};
 /// Budgeted: the rounding of a file's times; at 10 m/s it is 10 nm.
 pub(crate) const TIME_TOLERANCE_S: f64 = 1e-9;
 
+/// Share of a run's distance whose positions say where it starts, and how it is turned there, where headings
+/// were not measured.
+/// Convention: a tenth.
+pub(crate) const START_SHARE: f64 = 0.1;
+
+/// Least number of positions that do so.
+/// Convention: one more than a line needs.
+pub(crate) const MIN_START_POSITIONS: usize = 3;
+
 /// Largest size of a calibration file, bytes.
 /// Budgeted: a thousand times the size of such a file; anything larger is another file.
 pub(crate) const MAX_FILE_BYTES: u64 = 1 << 20;
@@ -33,9 +42,50 @@ pub(crate) const MAX_EVALUATED_DIAMETER_RATIO: f64 = 1.1;
 /// Convention: effective separations of robots that do not skid are within some per cent of nominal.
 pub(crate) const MAX_EVALUATED_SEPARATION_RATIO: f64 = 1.25;
 
-/// Ratio of the wheel separation to its nominal value, or the inverse, beyond which a remark is made.
-/// Convention: skid steering makes the effective separation 1.5 to 2 times as large.
-pub(crate) const MAX_PLAUSIBLE_SEPARATION_RATIO: f64 = 2.2;
+/// Ratio of the wheel separation to its nominal value, or the inverse, beyond which it is no correction.
+/// Convention: skid steering makes the effective separation 1.5 to 2.5 times as large, 4 at the most.
+pub(crate) const MAX_PLAUSIBLE_SEPARATION_RATIO: f64 = 4.0;
+
+/// Ratio of a length to its nominal value, or the inverse, beyond which it is remarked.
+/// Convention: rulers are good to a tenth; only skidding, or another formula, makes more of a separation.
+pub(crate) const MAX_UNREMARKED_RATIO: f64 = 1.25;
+
+/// Radians. Turning of all runs below which they hardly turn.
+/// Convention: half a turn.
+pub(crate) const MIN_TURNING_RAD: f64 = 3.0;
+
+/// Metres. Distance of all runs below which they only turn on the spot.
+/// Convention: two wheel separations of a small robot.
+pub(crate) const MIN_DISTANCE_M: f64 = 0.5;
+
+/// Share of the turning that goes the other way, below which all turns go one way.
+/// Budgeted: steering on the way is a twentieth.
+pub(crate) const MAX_OTHER_WAY: f64 = 0.05;
+
+/// Rows of datasets to which `check` fits the drive, at the most.
+/// Budgeted: some seconds of two cores.
+pub(crate) const MAX_CHECKED_ROWS: usize = 200_000;
+
+/// Runs of datasets to which `check` fits the drive, at the most.
+/// Budgeted: as for rows; a fit of many short runs takes as long.
+pub(crate) const MAX_CHECKED_RUNS: usize = 2_000;
+
+/// Metres. An instrument that a fit of the evaluated runs finds nearer to the drive's centre is at it.
+/// Convention: a tag is mounted to two centimetres by eye; evo and published drifts take it to be at the
+/// centre.
+pub(crate) const MIN_LEVER_M: f64 = 0.02;
+
+/// Radians. An instrument that is turned by less looks ahead.
+/// Convention: as for its place, a degree by eye.
+pub(crate) const MIN_YAW_RAD: f64 = 0.02;
+
+/// Standard deviations by which instruments of two sessions differ for certain.
+/// Convention: one pair in 400 by chance.
+pub(crate) const MIN_MOVED_SIGMAS: f64 = 3.0;
+
+/// Standard deviations by which distance lost in turns is seen.
+/// Convention: 95 %.
+pub(crate) const MIN_TURN_LOSS_SIGMAS: f64 = 2.0;
 
 /// Least component of a unit direction in relative left wheel, right wheel and separation that is the common
 /// scale.

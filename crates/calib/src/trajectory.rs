@@ -5,6 +5,8 @@
 //! motion of an interval is that of the likelihood: an arc of counts and terms together. Terms and latency of
 //! the instrument are taken out of what it measured, as the extrinsics of a calibration are.
 
+use std::borrow::Cow;
+
 use dataset::{RunView, Session};
 use estimation::{LogDeadReckoning, LogPose, Model};
 use kinematics::{DriveGeometry, Pose, Rule};
@@ -12,6 +14,7 @@ use model_term::ModelTerm;
 
 use crate::named_calibration::NamedCalibration;
 use crate::settings::{SAME_PLACE_M, TIME_TOLERANCE_S};
+use crate::starts_by::StartsBy;
 
 /// A calibration, and mean terms with their values where it is an extended model.
 #[derive(Clone)]
@@ -31,10 +34,20 @@ impl From<NamedCalibration> for AugmentedCalibration {
 }
 
 impl AugmentedCalibration {
+    /// The same with the instrument of a session ([`NamedCalibration::in_session`]).
+    #[must_use]
+    pub fn in_session(&self, session: &str) -> Cow<'_, Self> {
+        if self.calibration.own_instruments.is_empty() {
+            return Cow::Borrowed(self);
+        }
+        Cow::Owned(Self { calibration: self.calibration.clone().in_session(session), ..self.clone() })
+    }
+
     fn model(&self, geometry: &DriveGeometry) -> Model {
         Model {
             body_from_sensor: self.calibration.body_from_sensor(),
-            latency_s: self.calibration.latency_s(),
+            // Stamps are set back by it before.
+            latency_s: 0.0,
             term_values: self.term_values.clone(),
             ..Model::of(geometry, 0)
         }
@@ -62,6 +75,8 @@ pub(crate) struct Trajectory {
     pub(crate) measured: Vec<(f64, Pose)>,
     /// What takes the log to the first of them, or why there is nothing to start from.
     pub(crate) moved: Result<Pose, &'static str>,
+    /// How the run starts without a measured pose.
+    pub(crate) starts_by: Option<StartsBy>,
 }
 
 /// A run's poses at the rows of its log, for other programs.
@@ -113,6 +128,8 @@ pub struct RunPath {
     pub rows: Vec<Pose>,
     /// Poses of the robot that the instrument measured.
     pub measured: Vec<Pose>,
+    /// Their instants, seconds on the log's clock.
+    pub measured_t_s: Vec<f64>,
     /// The dead-reckoned poses at the same instants; `None` outside of the log.
     pub at_measured: Vec<Option<Pose>>,
 }
@@ -127,7 +144,8 @@ impl RunPath {
         let mut rows_s = run.odometry().t_s.iter().peekable();
         let is_row = |(t_s, _): &&(f64, Pose)| rows_s.next_if(|row_s| **row_s == *t_s).is_some();
         let rows = log.iter().filter(is_row).map(|(_, pose)| by * *pose).collect();
-        Self { rows, measured: measured.iter().map(|(_, pose)| *pose).collect(), at_measured }
+        let (measured_t_s, measured) = measured.iter().copied().unzip();
+        Self { rows, measured, measured_t_s, at_measured }
     }
 }
 
@@ -158,19 +176,25 @@ impl Trajectory {
         driven_m: &mut f64,
     ) -> Option<Self> {
         let nominal = session.robot.geometry().ok()?;
-        let Some(augmented) = calibration else { return Some(Self::plain(session, run, nominal, Pose::IDENTITY)) };
+        let Some(augmented) = calibration else { return Some(Self::plain(session, run, nominal, None)) };
         let geometry = augmented.calibration.geometry(session.robot, nominal)?;
         Some(if augmented.terms.is_empty() {
-            Self::plain(session, run, geometry, augmented.calibration.body_from_sensor())
+            Self::plain(session, run, geometry, Some(&augmented.calibration))
         } else {
             Self::augmented(session, run, geometry, augmented, driven_m)
         })
     }
 
-    /// Under a geometry and extrinsics.
-    fn plain(session: &Session<'_>, run: &RunView<'_>, geometry: DriveGeometry, body_from_sensor: Pose) -> Self {
+    /// Under a geometry, and the instrument of a calibration.
+    fn plain(
+        session: &Session<'_>,
+        run: &RunView<'_>,
+        geometry: DriveGeometry,
+        calibration: Option<&NamedCalibration>,
+    ) -> Self {
+        let body_from_sensor = calibration.map_or(Pose::IDENTITY, NamedCalibration::body_from_sensor);
         let of_body = |(t_s, world_from_sensor): (f64, Pose)| (t_s, world_from_sensor * body_from_sensor.inverse());
-        let measured: Vec<(f64, Pose)> = run.observed_poses().into_iter().map(of_body).collect();
+        let measured: Vec<(f64, Pose)> = seen(run, calibration).into_iter().map(of_body).collect();
         let start = measured.first().map(|(_, world_from_body)| *world_from_body);
         let mut log = Vec::with_capacity(run.odometry().t_s.len());
         let visit = |t_s, pose| log.push((t_s, pose));
@@ -202,7 +226,7 @@ impl Trajectory {
         let mut terms = augmented.terms.clone();
         let body_from_sensor = augmented.calibration.body_from_sensor();
         let model = augmented.model(&geometry);
-        let seen = run.observed_poses();
+        let seen = seen(run, Some(&augmented.calibration));
         let log_start_s = run.odometry().t_s.first().copied().unwrap_or(f64::NEG_INFINITY);
         // The first measurement holds at the log's first row where it was before it.
         let seen_s: Vec<f64> = seen
@@ -231,11 +255,11 @@ impl Trajectory {
             }
         }
         let mut row = 0;
-        let measured = seen.iter().zip(&seen_s).map(|((stamp_s, world_from_sensor), t_s)| {
+        let measured = seen.iter().zip(&seen_s).map(|((measured_s, world_from_sensor), t_s)| {
             while row + 1 < poses.len() && poses[row].t_s < t_s - TIME_TOLERANCE_S {
                 row += 1;
             }
-            (*stamp_s, of_body(*world_from_sensor, poses[row].offset.unwrap_or_default()))
+            (*measured_s, of_body(*world_from_sensor, poses[row].offset.unwrap_or_default()))
         });
         let measured = measured.collect();
         let log = poses.iter().map(|pose| (pose.t_s, pose.world_from_body)).collect();
@@ -252,13 +276,30 @@ impl Trajectory {
         let length_m = log.windows(2).map(distance_m).fold(0.0, |length_m, step_m| length_m + step_m);
         let moved = match measured.first() {
             None if run.run().truth.is_empty() => Err(
-                "no absolute truth: displacements, wheel speeds, a gyro and partial measurements give no drift from the start pose",
+                "no absolute truth: wheel speeds, a gyro and partial measurements give no drift, and displacements no start pose",
             ),
             None => Err("position-only truth gives no start heading"),
             Some(_) => moved,
         };
-        Self { log, length_m, measured, moved }
+        Self { log, length_m, measured, moved, starts_by: None }
     }
+}
+
+/// What the instrument measured, at the instants by the log's clock: stamps are set back by the latency that
+/// a calibration has. Of what was measured before the log's first row, the last holds there.
+fn seen(run: &RunView<'_>, calibration: Option<&NamedCalibration>) -> Vec<(f64, Pose)> {
+    let mut seen = run.observed_poses();
+    let latency_s = calibration.map_or(0.0, NamedCalibration::latency_s);
+    if latency_s != 0.0 {
+        let start_s = run.odometry().t_s.first().copied().unwrap_or(f64::NEG_INFINITY);
+        seen.iter_mut().for_each(|(t_s, _)| *t_s -= latency_s);
+        let before = seen.iter().take_while(|(t_s, _)| *t_s < start_s).count();
+        seen.drain(..before.saturating_sub(1));
+        if let Some((t_s, _)) = seen.first_mut().filter(|_| before > 0) {
+            *t_s = start_s;
+        }
+    }
+    seen
 }
 
 /// The dead-reckoned pose at an instant, `row` being a cursor that only moves forward; `None` outside of the

@@ -41,6 +41,28 @@ impl<C: Checked, const N: usize> Checked for [C; N] {
     }
 }
 
+impl<C: Checked> Checked for Vec<C> {
+    type Plain = Vec<C::Plain>;
+    fn plain(self) -> Self::Plain {
+        self.into_iter().map(C::plain).collect()
+    }
+}
+
+impl<A: Checked, B: Checked> Checked for (A, B) {
+    type Plain = (A::Plain, B::Plain);
+    fn plain(self) -> Self::Plain {
+        (self.0.plain(), self.1.plain())
+    }
+}
+
+/// The name before a number.
+impl Checked for String {
+    type Plain = Self;
+    fn plain(self) -> Self {
+        self
+    }
+}
+
 /// Reads a plain field through its checked type: `#[serde(deserialize_with = "checked::<Positive, _>")]`. An
 /// optional one needs `default` beside it.
 ///
@@ -119,9 +141,14 @@ mod tests {
             length_m: f64,
             #[serde(default, deserialize_with = "checked::<Option<[NotNegative; 2]>, _>")]
             sigmas: Option<[f64; 2]>,
+            #[serde(default, deserialize_with = "checked::<Vec<(String, Number)>, _>")]
+            named: Vec<(String, f64)>,
         }
         let read = |text: &str| serde_json::from_str::<Document>(text).map_err(|error| error.to_string());
-        assert_eq!(read(r#"{"length_m": 2}"#), Ok(Document { length_m: 2.0, sigmas: None }));
+        assert_eq!(read(r#"{"length_m": 2}"#), Ok(Document { length_m: 2.0, sigmas: None, named: Vec::new() }));
+        let named = |number: &str| read(&format!(r#"{{"length_m": 2, "named": [["a", 1], ["b", {number}]]}}"#));
+        assert_eq!(named("-3").map(|of| of.named), Ok(vec![("a".to_owned(), 1.0), ("b".to_owned(), -3.0)]));
+        assert!(named("1e61").is_err_and(|why| why.starts_with("1e61 where a number of at most 1e60 is expected")));
         assert_eq!(read(r#"{"length_m": 2, "sigmas": [0, 1.5]}"#).map(|of| of.sigmas), Ok(Some([0.0, 1.5])));
         let why = read(r#"{"length_m": 2, "sigmas": [0, -1]}"#).expect_err("negative");
         assert!(why.starts_with("-1.0 where 0 or a number from 1e-60 to 1e60 is expected"), "{why}");

@@ -1,6 +1,10 @@
 //! What usual names of columns mean: for the importer of CSV files, and for what the reader says of a table
 //! whose columns are named otherwise.
 
+use crate::column_words::{
+    COUNTED, HEADING, LEFT, NEVER, NUMBERED, OF_ROTATION, OF_WHEEL, OTHER_THAN_RATES, OUTSIDE, OWN, RATE, RIGHT, RUN,
+    SPEED, TIME, YAW_RATE,
+};
 use crate::name_units::{take_unit, tokens_of, without_bracketed_unit};
 use crate::unit::Unit;
 
@@ -12,6 +16,8 @@ pub enum Quantity {
     Run,
     /// When.
     Time,
+    /// Nanoseconds beside the whole seconds of the time.
+    Nanoseconds,
     /// The left wheel.
     Left,
     /// The right wheel.
@@ -20,6 +26,8 @@ pub enum Quantity {
     Speed,
     /// Yaw rate of the robot by its wheels.
     YawRate,
+    /// Yaw rate of the robot by a gyroscope.
+    Gyro,
     /// Position in the room.
     X,
     /// Position in the room.
@@ -38,13 +46,15 @@ pub enum Quantity {
 
 impl Quantity {
     /// All, in the order in which they are shown.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 15] = [
         Self::Run,
         Self::Time,
+        Self::Nanoseconds,
         Self::Left,
         Self::Right,
         Self::Speed,
         Self::YawRate,
+        Self::Gyro,
         Self::X,
         Self::Y,
         Self::Heading,
@@ -60,10 +70,12 @@ impl Quantity {
         match self {
             Self::Run => "run",
             Self::Time => "t",
+            Self::Nanoseconds => "nanosec",
             Self::Left => "left",
             Self::Right => "right",
             Self::Speed => "v",
             Self::YawRate => "omega",
+            Self::Gyro => "gyro",
             Self::X => "x",
             Self::Y => "y",
             Self::Heading => "theta",
@@ -74,14 +86,25 @@ impl Quantity {
         }
     }
 
+    /// Whether it says where the robot stood.
+    pub(crate) const fn is_of_pose(self) -> bool {
+        matches!(self, Self::X | Self::Y | Self::Heading | Self::Qx | Self::Qy | Self::Qz | Self::Qw)
+    }
+
+    /// Whether it says how the robot moved, by its own instruments.
+    pub(crate) const fn is_of_robot(self) -> bool {
+        matches!(self, Self::Left | Self::Right | Self::Speed | Self::YawRate | Self::Gyro)
+    }
+
     /// Whether it can be in a unit: of a wheel its counts, its angle, its contact's path, or their rates.
     pub(crate) fn accepts(self, unit: Unit) -> bool {
         match self {
+            Self::Nanoseconds => unit == Unit::Ns,
             Self::Run | Self::Qx | Self::Qy | Self::Qz | Self::Qw => false,
             Self::Time => Unit::TIMES.contains(&unit),
             Self::Left | Self::Right => Unit::WHEELS.contains(&unit) || Unit::LENGTHS.contains(&unit),
             Self::Speed => unit.is_of_contact(),
-            Self::YawRate => unit.is_rate() && !unit.is_of_contact(),
+            Self::YawRate | Self::Gyro => unit.is_rate() && !unit.is_of_contact(),
             Self::X | Self::Y => Unit::LENGTHS.contains(&unit),
             Self::Heading => Unit::ANGLES.contains(&unit),
         }
@@ -103,142 +126,30 @@ pub(crate) struct NameReading {
     pub(crate) rank: u8,
     /// The robot's own estimate: no outside instrument's.
     pub(crate) is_own: bool,
+    /// An outside instrument's, by name.
+    pub(crate) is_outside: bool,
     /// The name says that the wheel is a rate.
     pub(crate) is_rate: bool,
     /// The name says that the wheel is counted.
     pub(crate) is_counted: bool,
+    /// The name says that the wheel is an angle.
+    pub(crate) is_angle: bool,
 }
 
-const OWN: &[&str] =
-    &["odom", "odometry", "odo", "est", "estimate", "estimated", "dr", "reckoned", "ekf", "fused", "filtered"];
-const OUTSIDE: &[&str] = &[
-    "gt",
-    "truth",
-    "true",
-    "ground",
-    "groundtruth",
-    "ref",
-    "reference",
-    "mocap",
-    "vicon",
-    "optitrack",
-    "qualisys",
-    "cam",
-    "camera",
-    "slam",
-    "amcl",
-    "map",
-    "tag",
-    "apriltag",
-    "laser",
-    "lidar",
-    "tracker",
-    "actual",
-    "world",
-];
-const NEVER: &[&str] = &[
-    "cmd",
-    "command",
-    "commanded",
-    "set",
-    "setpoint",
-    "target",
-    "desired",
-    "des",
-    "goal",
-    "soll",
-    "acc",
-    "accel",
-    "acceleration",
-    "imu",
-    "mag",
-    "gyro",
-    "cov",
-    "covariance",
-    "sigma",
-    "std",
-    "var",
-    "battery",
-    "voltage",
-    "current",
-    "temp",
-    "temperature",
-    "pwm",
-    "duty",
-    "err",
-    "error",
-    "status",
-    "frame",
-    "seq",
-    "torque",
-    "offset",
-    "dt",
-];
-const TIME: &[&str] = &[
-    "t",
-    "time",
-    "timestamp",
-    "stamp",
-    "ts",
-    "zeit",
-    "zeitstempel",
-    "clock",
-    "uhrzeit",
-    "epoch",
-    "elapsed",
-    "sec",
-    "secs",
-    "seconds",
-    "millis",
-    "micros",
-    "nanos",
-];
-const RUN: &[&str] =
-    &["run", "runs", "trial", "lauf", "versuch", "experiment", "lap", "segment", "session", "episode", "bag", "fahrt"];
-const NUMBERED: &[&str] = &["id", "no", "nr", "number", "index", "name", "num"];
-const LEFT: &[&str] = &["left", "l", "lft", "links", "linkes", "linker", "li", "lw", "lh"];
-const RIGHT: &[&str] = &["right", "r", "rgt", "rechts", "rechtes", "rechter", "re", "rw", "rh"];
-const COUNTED: &[&str] = &[
-    "enc",
-    "encoder",
-    "encoders",
-    "tick",
-    "ticks",
-    "count",
-    "counts",
-    "cnt",
-    "pulse",
-    "pulses",
-    "inkremente",
-    "impulse",
-    "n",
-];
-const RATE: &[&str] =
-    &["vel", "velocity", "speed", "v", "w", "omega", "rate", "rpm", "dot", "geschwindigkeit", "drehzahl", "twist"];
-/// Further words that stand with a side: `lwheel`, `posl`.
-const OF_WHEEL: &[&str] =
-    &["wheel", "rad", "angle", "ang", "pos", "position", "phi", "theta", "motor", "mot", "m", "winkel"];
-const HEADING: &[&str] = &[
-    "theta",
-    "th",
-    "yaw",
-    "heading",
-    "psi",
-    "phi",
-    "hdg",
-    "azimuth",
-    "gierwinkel",
-    "winkel",
-    "kurs",
-    "richtung",
-    "orientation",
-    "angle",
-    "rot",
-    "bearing",
-];
-const SPEED: &[&str] = &["v", "vx", "vel", "velocity", "speed", "linear", "lin", "geschwindigkeit"];
-const YAW_RATE: &[&str] = &["omega", "w", "wz", "yawrate", "vth", "vtheta", "angular", "gierrate", "turnrate"];
-const OF_ROTATION: &[&str] = &["orientation", "quat", "quaternion", "q", "rot", "rotation"];
+impl NameReading {
+    const fn of(quantity: Quantity) -> Self {
+        Self {
+            quantity,
+            unit: None,
+            rank: 0,
+            is_own: false,
+            is_outside: false,
+            is_rate: false,
+            is_counted: false,
+            is_angle: false,
+        }
+    }
+}
 
 /// Reads a column's name; `None` where it says nothing of these quantities.
 pub(crate) fn read_name(name: &str) -> Option<NameReading> {
@@ -248,11 +159,21 @@ pub(crate) fn read_name(name: &str) -> Option<NameReading> {
         unit = take_unit(&mut tokens);
     }
     let has = |words: &[&str]| tokens.iter().any(|token| words.contains(&token.as_str()));
-    let reading =
-        |quantity, rank| Some(NameReading { quantity, unit, rank, is_own: false, is_rate: false, is_counted: false });
+    let reading = |quantity, rank| Some(NameReading { unit, rank, ..NameReading::of(quantity) });
     if tokens.is_empty() {
         // "ms" alone is a time; "mm" alone says nothing.
         return unit.filter(|unit| Unit::TIMES.contains(unit)).and_then(|_| reading(Quantity::Time, 2));
+    }
+    // An Imu's angular velocity about z; of a gyroscope also without the axis.
+    let of_axis = |axes: &[&str]| tokens.iter().any(|token| axes.contains(&token.as_str()));
+    if has(&["gyro", "gyroscope", "imu"]) && !has(OTHER_THAN_RATES) {
+        let is_rate = has(&["gyro", "gyroscope"]) || has(YAW_RATE) || (has(HEADING) && has(RATE));
+        let is_about_z =
+            of_axis(&["z", "wz", "gz", "yaw"]) || (!of_axis(&["x", "y", "wx", "wy", "gx", "gy"]) && tokens.len() == 1);
+        return (is_rate && is_about_z).then(|| NameReading { unit, rank: 2, ..NameReading::of(Quantity::Gyro) });
+    }
+    if tokens.len() == 1 && of_axis(&["gz", "gyroz", "zgyro"]) {
+        return reading(Quantity::Gyro, 1);
     }
     if has(NEVER) {
         return None;
@@ -277,7 +198,9 @@ pub(crate) fn read_name(name: &str) -> Option<NameReading> {
         let has = |known: &[&str]| words.iter().any(|word| known.contains(&word.as_str()));
         // `rpm_left`; no other word, as a German wheel is a Rad.
         let unit = unit.or(has(&["rpm"]).then_some(Unit::Rpm));
-        let is_counted = unit == Some(Unit::Ticks) || has(COUNTED);
+        // An encoder's rate is no reading of its counter.
+        let of_rate = ["rate", "speed", "velocity", "vel", "rpm"];
+        let is_counted = unit == Some(Unit::Ticks) || (has(COUNTED) && !has(&of_rate));
         let is_rate = !is_counted && (unit.is_some_and(Unit::is_rate) || has(RATE));
         let rank = if is_counted {
             3
@@ -286,7 +209,8 @@ pub(crate) fn read_name(name: &str) -> Option<NameReading> {
         } else {
             2
         };
-        return Some(NameReading { quantity, unit, rank, is_own: false, is_rate, is_counted });
+        let is_angle = !is_counted && !is_rate && has(&["position", "pos", "angle", "ang", "phi", "theta", "winkel"]);
+        return Some(NameReading { unit, rank, is_rate, is_counted, is_angle, ..NameReading::of(quantity) });
     }
     let last = tokens.last().map_or("", String::as_str);
     let is_own = has(OWN);
@@ -297,7 +221,8 @@ pub(crate) fn read_name(name: &str) -> Option<NameReading> {
     } else {
         1
     };
-    let pose = |quantity| Some(NameReading { quantity, unit, rank, is_own, is_rate: false, is_counted: false });
+    let is_outside = rank == 2;
+    let pose = |quantity| Some(NameReading { unit, rank, is_own, is_outside, ..NameReading::of(quantity) });
     let moving = has(RATE) || has(&["linear", "angular", "lin"]);
     match (last, has(OF_ROTATION)) {
         ("qx", _) | ("x", true) => return pose(Quantity::Qx),
@@ -360,7 +285,7 @@ fn side(tokens: &[String]) -> Option<(Quantity, Vec<String>)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use Quantity::{Heading, Left, Qw, Qz, Right, Run, Speed, Time, X, Y, YawRate};
+    use Quantity::{Gyro, Heading, Left, Qw, Qz, Right, Run, Speed, Time, X, Y, YawRate};
 
     fn read(name: &str) -> Option<(Quantity, Option<Unit>)> {
         read_name(name).map(|reading| (reading.quantity, reading.unit))
@@ -385,6 +310,10 @@ mod tests {
         assert_eq!(read("speed_kmh"), Some((Speed, Some(Unit::KmPerH))));
         for name in ["enc_l", "left_encoder", "ticksLeft", "lw", "encL", "leftWheel", "links", "wl", "l"] {
             assert_eq!(read(name), Some((Left, None)), "{name}");
+        }
+        assert!(read_name("left_encoder_rate").is_some_and(|reading| reading.is_rate && !reading.is_counted));
+        for name in ["gyro_z", "gyro", "imu.angular_velocity.z", "gz", "imu_yaw_rate"] {
+            assert_eq!(read(name), Some((Gyro, None)), "{name}");
         }
         assert_eq!(read("ticks_right"), Some((Right, None)));
         assert_eq!(read("right_ticks"), Some((Right, Some(Unit::Ticks))));
@@ -412,7 +341,17 @@ mod tests {
 
     #[test]
     fn what_is_something_else_is_not_taken() {
-        for name in ["cmd_v", "imu.angular_velocity.z", "battery", "accel_x", "linear.y", "sigma_x", "", "comment"] {
+        for name in [
+            "cmd_v",
+            "imu.angular_velocity.x",
+            "imu.orientation.z",
+            "battery",
+            "accel_x",
+            "linear.y",
+            "sigma_x",
+            "",
+            "comment",
+        ] {
             assert_eq!(read_name(name), None, "{name}");
         }
         assert!(read_name("odom_x").is_some_and(|reading| reading.is_own));

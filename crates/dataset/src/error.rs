@@ -46,7 +46,7 @@ pub enum DatasetError {
     },
     /// No table of an instrument is there, and no gyroscope stands beside the wheels.
     #[error(
-        "{dir}: no truth; expected at least one of truth.csv, displacement.csv, points.csv and wheel_reference.csv beside odometry.csv, or revisit.csv, distance.csv, wall.csv, or gyro_radps in it"
+        "{dir}: no truth; expected at least one of truth.csv, displacement.csv, points.csv and wheel_reference.csv next to odometry.csv, or revisit.csv, distance.csv, wall.csv, or gyro_radps in it"
     )]
     NoTruth {
         /// The dataset's folder.
@@ -217,7 +217,7 @@ pub enum DatasetError {
         hint: String,
     },
     /// A table names a column twice.
-    #[error("{file}:1: column {column} stands there twice; expected each column once")]
+    #[error("{file}:1: column {column} occurs twice; expected each column once")]
     DuplicateColumn {
         /// The file.
         file: PathBuf,
@@ -387,7 +387,7 @@ pub enum DatasetError {
     },
 
     /// Two readings of a file are nearly as likely.
-    #[error("{file}: {what} may be {readings}, and nothing here tells which; say {flag}")]
+    #[error("{file}: {what} may be {readings}, and nothing here decides which; add {flag}")]
     Undecided {
         /// The file.
         file: PathBuf,

@@ -46,7 +46,7 @@ impl PoseCovariance {
             return Err("one of cov_xx and cov_yy is zero");
         }
         if xx == 0.0 && (xy != 0.0 || xt != 0.0 || yt != 0.0) || tt == 0.0 && (xt != 0.0 || yt != 0.0) {
-            return Err("a covariance stands beside a variance of zero");
+            return Err("a covariance with a variance of zero");
         }
         if elements == [0.0; 6] {
             return Ok(None);
@@ -124,8 +124,8 @@ mod tests {
         for (elements, why) in [
             ([-1.0, 0.0, 0.0, 1.0, 0.0, 1.0], "negative"),
             ([1.0, 0.0, 0.0, 0.0, 0.0, 1.0], "one of"),
-            ([1.0, 0.0, 0.5, 1.0, 0.0, 0.0], "beside a variance of zero"),
-            ([0.0, 0.5, 0.0, 0.0, 0.0, 1.0], "beside a variance of zero"),
+            ([1.0, 0.0, 0.5, 1.0, 0.0, 0.0], "with a variance of zero"),
+            ([0.0, 0.5, 0.0, 0.0, 0.0, 1.0], "with a variance of zero"),
             ([1.0, 2.0, 0.0, 1.0, 0.0, 1.0], "positive definite"),
             // Each pair is possible, all three are not.
             ([1.0, 0.9, 0.9, 1.0, -0.9, 1.0], "positive definite"),

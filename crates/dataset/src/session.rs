@@ -267,9 +267,9 @@ impl<'a> RunView<'a> {
     }
 }
 
-/// `room_from_body` that carries body points onto room points with the least squared error; `None` for fewer
-/// than two distinct points.
-fn fit_rigid(pairs: impl Iterator<Item = (Point, Point)> + Clone) -> Option<Pose> {
+/// `room_from_body` of least squared error over pairs of points; `None` for fewer than two distinct points.
+#[must_use]
+pub fn fit_rigid(pairs: impl Iterator<Item = (Point, Point)> + Clone) -> Option<Pose> {
     let mut sums = RigidSums::default();
     pairs.clone().for_each(|pair| sums.add(pair));
     let mut moments = sums.moments();

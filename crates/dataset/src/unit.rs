@@ -44,6 +44,12 @@ pub enum Unit {
     InchPerS,
     /// Kilometres an hour.
     KmPerH,
+    /// Counts since the row before.
+    TicksPerRow,
+    /// Radians since the row before.
+    RadPerRow,
+    /// Metres since the row before.
+    MPerRow,
     /// None: a name.
     Text,
     /// None: a component of a unit quaternion.
@@ -58,7 +64,7 @@ impl Unit {
     /// Units of angle.
     pub const ANGLES: [Self; 2] = [Self::Rad, Self::Deg];
     /// Units in which a wheel is logged.
-    pub const WHEELS: [Self; 11] = [
+    pub const WHEELS: [Self; 14] = [
         Self::Ticks,
         Self::Rad,
         Self::Deg,
@@ -70,6 +76,9 @@ impl Unit {
         Self::MmPerS,
         Self::InchPerS,
         Self::KmPerH,
+        Self::TicksPerRow,
+        Self::RadPerRow,
+        Self::MPerRow,
     ];
 
     /// The name that flags and output use.
@@ -95,6 +104,9 @@ impl Unit {
             Self::MmPerS => "mm/s",
             Self::InchPerS => "in/s",
             Self::KmPerH => "km/h",
+            Self::TicksPerRow => "ticks/row",
+            Self::RadPerRow => "rad/row",
+            Self::MPerRow => "m/row",
             Self::Text => "a name",
             Self::One => "1",
         }
@@ -123,6 +135,9 @@ impl Unit {
             "mm/s" | "mmps" | "mm/sec" => Self::MmPerS,
             "in/s" | "inch/s" | "ips" | "in/sec" => Self::InchPerS,
             "km/h" | "kmh" | "kph" => Self::KmPerH,
+            "ticks/row" | "counts/row" => Self::TicksPerRow,
+            "rad/row" => Self::RadPerRow,
+            "m/row" => Self::MPerRow,
             _ => return None,
         };
         Some(unit)
@@ -149,6 +164,12 @@ impl Unit {
     #[must_use]
     pub const fn is_rate(self) -> bool {
         matches!(self, Self::RadPerS | Self::DegPerS | Self::Rpm) || self.is_of_contact()
+    }
+
+    /// Whether a wheel so logged is what it moved since the row before.
+    #[must_use]
+    pub const fn is_per_row(self) -> bool {
+        matches!(self, Self::TicksPerRow | Self::RadPerRow | Self::MPerRow)
     }
 
     /// Whether it says how fast or far the wheel's contact goes, whatever the wheel.

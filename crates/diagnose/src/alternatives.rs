@@ -64,7 +64,7 @@ impl Status {
         match self {
             Self::Found => "found",
             Self::NotDiscriminated => "not discriminated from what was found",
-            Self::ExplainsLess => "explains less than what was found, and is not needed beside that",
+            Self::ExplainsLess => "explains less than what was found, and is not needed with it",
             Self::Refused(Refusal::Unphysical) => "significant, but its estimates are those of no possible effect",
             Self::Refused(Refusal::Implausible) => "significant, but its size is beyond what robots have",
             Self::Refused(Refusal::OtherWheels) => {
@@ -75,7 +75,7 @@ impl Status {
             Self::Refused(Refusal::PredictsWorse) => "significant, but it predicts held-out runs worse",
             Self::Refused(Refusal::DriftsMore) => "significant, but odometry drifts more with it on held-out runs",
             Self::Refused(Refusal::Cancels) => {
-                "significant only beside another effect that takes it back: together they are far less than each is"
+                "significant only with another effect that cancels it: together they are far less than each is"
             }
             Self::NotSignificant => "not significant",
             Self::NotDetectable => "not detectable in these data",

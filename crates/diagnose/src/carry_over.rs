@@ -144,7 +144,7 @@ pub(crate) fn carry_over(model: &AugmentedModel<'_>, candidate: usize, names: &[
 /// The verdict over the units of all levels.
 fn verdict(by_level: &[SizesByUnit]) -> (Option<bool>, String) {
     if by_level.is_empty() {
-        return (None, "one session and one kind of path: nothing to carry over to was driven".to_owned());
+        return (None, "one session and one kind of path: no other was driven".to_owned());
     }
     let mut supported = Vec::new();
     let mut open = Vec::new();
@@ -191,7 +191,7 @@ fn verdict(by_level: &[SizesByUnit]) -> (Option<bool>, String) {
     }
     let all = [&supported[..], &open[..]].concat().join("; ");
     if open.is_empty() {
-        return (Some(true), format!("each unit that could tell has more than half of the size: {all}"));
+        return (Some(true), format!("at least half of this size wherever it can be tested: {all}"));
     }
     (None, all)
 }
@@ -363,7 +363,7 @@ pub(crate) mod tests {
         let both = verdict(&[sessions(vec![agrees(), agrees()]), sessions(vec![agrees(), near()])]);
         assert_eq!(both, (None, "2 of 2 by session; too weak in session b".to_owned()));
         let (all, why) = verdict(&[sessions(vec![agrees(), agrees(), weak("b", 1.0)])]);
-        assert!(all == Some(true) && why.ends_with("of the size: 2 of 3 by session"), "{why}");
+        assert!(all == Some(true) && why.ends_with("can be tested: 2 of 3 by session"), "{why}");
         // A unit that is 1.7 below nothing is none of three by chance: 0.045 · 3. Rejects each for itself,
         // and one that is as far above.
         let below = |z: f64| unit("b", (0.4, 0.1), (-0.1 * z, 0.1));

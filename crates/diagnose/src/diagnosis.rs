@@ -21,7 +21,7 @@ use crate::document::{Document, Gain};
 use crate::extrinsics;
 use crate::finding::Finding;
 use crate::findings::{StageResults, findings};
-use crate::gain::gain_by_level;
+use crate::gain::{gain_by_level, held_out_drift};
 use crate::large_log::LargeLog;
 use crate::log_rows::{check_rows, check_spans};
 use crate::mean_structure::{THINNED, mean_structure};
@@ -350,6 +350,11 @@ fn stages(
     } else {
         (None, Some("no cause is certain enough for the extended model".to_owned()))
     };
+    let drift_of_runs = if faults.is_empty() {
+        held_out_drift(&AugmentedModel::base(before), gain.as_ref().map(|_| &carried))
+    } else {
+        None
+    };
     begins(Step::Detectability);
     let (sensitivity, blind_to) = detectability(model, &catalogue, &mut structure.found.known.clone());
     begins(Step::NextExperiment);
@@ -383,6 +388,7 @@ fn stages(
         blind_to,
         sensitivity,
         calibration: calibration_of(&carried),
+        drift: drift_of_runs,
         gain,
         gain_why_null,
         nested: Vec::new(),

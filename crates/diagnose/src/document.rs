@@ -45,6 +45,9 @@ pub struct Document {
     pub sensitivity: Vec<Blind>,
     /// The calibration with what was found in the model.
     pub calibration: CalibrationReport,
+    /// Drift of dead reckoning on held-out runs; `None` where a fault of the records was undone before, or
+    /// nothing can be held out.
+    pub drift: Option<HeldOutDrift>,
     /// What the extension gains on held-out runs.
     pub gain: Option<Gain>,
     /// Why there is no gain.
@@ -243,6 +246,37 @@ pub struct Smallest {
     pub unit: String,
     /// Which parameter.
     pub parameter: String,
+}
+
+/// Final position error of dead reckoning over the distance driven, per cent, on runs that were held out: as
+/// configured, calibrated on the other runs, and with what was found as well.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct HeldOutDrift {
+    /// How many runs, or blocks of runs, were held out, each once.
+    pub held_out_runs: usize,
+    /// Distance driven by all of them, metres.
+    pub distance_m: f64,
+    /// How many runs that distance is of.
+    pub runs: usize,
+    /// With the nominal geometry.
+    pub nominal: Drift,
+    /// With the geometry calibrated.
+    pub calibrated: Drift,
+    /// With the extended model; `None` where it is the calibrated one.
+    pub extended: Option<Drift>,
+    /// What calibrating gains over the nominal geometry (`base`), run by run.
+    pub calibrated_over_nominal: Compared,
+}
+
+/// A drift with its 95 % interval over runs.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Drift {
+    /// Final position error over the distance, per cent.
+    pub percent: f64,
+    /// Lower bound at 95 %; 0 where the interval would reach below.
+    pub low: f64,
+    /// Upper bound at 95 %.
+    pub high: f64,
 }
 
 /// What an extension gains on runs that were held out: fitted without them, then tried on them. Bounds are at

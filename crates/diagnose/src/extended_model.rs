@@ -120,7 +120,7 @@ impl ExtendedModel {
             }
             effects.push(ModelledEffect { id, values: own_sizes, terms: first..terms.len() });
         }
-        let calibration = NamedCalibration { name: scenario.name.clone(), values: calibrated(scenario)? };
+        let calibration = NamedCalibration::new(scenario.name.clone(), calibrated(scenario)?);
         Ok(Self { calibration: AugmentedCalibration { calibration, terms, term_values }, effects, remarks, faults })
     }
 

@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::augmented_model::{AugmentedModel, left_out_cost};
 use crate::candidate::terms;
 use crate::carry_over::{Level, Units};
-use crate::document::{Compared, Gain, GainLevel, LevelGain};
+use crate::document::{Compared, Drift, Gain, GainLevel, HeldOutDrift, LevelGain};
 use crate::settings::levels::MIN_RUNS;
 use crate::settings::records::{SEPARATION_PRIOR_SIGMA, WHEEL_PRIOR_SIGMA};
 use crate::settings::search::{HOLD_OUT_FOLDS, MIN_HELD_OUT_UNITS};
@@ -71,6 +71,45 @@ pub(crate) fn gain_by_level(
     Ok(Gain { levels, ..gain })
 }
 
+/// Drift on held-out runs as configured, calibrated, and with what was found; `None` where nothing can be
+/// held out, or a run has no drift.
+pub(crate) fn held_out_drift(base: &AugmentedModel<'_>, extended: Option<&AugmentedModel<'_>>) -> Option<HeldOutDrift> {
+    let fit = &base.fit;
+    let held_out =
+        |model: &AugmentedModel<'_>| held_out_units(&model.fit, &mut terms(&model.candidates), HeldOut::Runs).ok();
+    let (units, calibrated) = held_out(base)?;
+    let mut model = fit.solution.model.clone();
+    (model.m_per_rad, model.separation_m) = (fit.nominal.m_per_rad, fit.nominal.separation_m);
+    let nominal = fit.dead_reckoned_of(&model, &mut terms(&base.candidates), |_| true);
+    let extended = match extended {
+        None => None,
+        Some(extended) => Some(Drift::of(&held_out(extended)?.1)?),
+    };
+    Some(HeldOutDrift {
+        held_out_runs: units.len(),
+        distance_m: calibrated.iter().map(|end| end.length_m).sum(),
+        runs: by_unit(&calibrated, HeldOut::Runs).len(),
+        nominal: Drift::of(&nominal)?,
+        calibrated: Drift::of(&calibrated)?,
+        extended,
+        calibrated_over_nominal: drift(&nominal, &calibrated, HeldOut::Runs)?,
+    })
+}
+
+impl Drift {
+    fn of(ends: &[EndError]) -> Option<Self> {
+        let units = by_unit(ends, HeldOut::Runs);
+        let pairs: Vec<(f64, f64)> = units.iter().map(|(error_m, length_m)| (100.0 * error_m, *length_m)).collect();
+        if pairs.len() < 2 {
+            return None;
+        }
+        let (percent, error) = ratio(&pairs);
+        let half_width = student_95(pairs.len() as f64 - 1.0) * error;
+        let is_number = percent.is_finite() && half_width.is_finite();
+        is_number.then_some(Self { percent, low: (percent - half_width).max(0.0), high: percent + half_width })
+    }
+}
+
 /// How many runs or blocks were held out, and both models' scores and drift over what was held out together.
 fn compared(
     base: &AugmentedModel<'_>,
@@ -113,19 +152,7 @@ fn compared(
 
 /// Drift under both models, by what was held out together.
 pub(crate) fn drift(before: &[EndError], after: &[EndError], held_out: HeldOut<'_>) -> Option<Compared> {
-    let by_unit = |ends: &[EndError]| -> Vec<(f64, f64)> {
-        let mut sums: BTreeMap<(usize, usize), (f64, f64)> = BTreeMap::new();
-        for end in ends {
-            let unit = match held_out {
-                HeldOut::Runs => end.run,
-                HeldOut::Units(units) => (units.of_run.get(&end.run).copied().unwrap_or(usize::MAX), 0),
-            };
-            let sum = sums.entry(unit).or_default();
-            *sum = (sum.0 + end.position_m, sum.1 + end.length_m);
-        }
-        sums.into_values().collect()
-    };
-    let (before, after) = (by_unit(before), by_unit(after));
+    let (before, after) = (by_unit(before, held_out), by_unit(after, held_out));
     let distance_m: f64 = before.iter().map(|unit| unit.1).sum();
     if before.len() != after.len() || before.len() < 2 || distance_m <= 0.0 {
         return None;
@@ -134,6 +161,20 @@ pub(crate) fn drift(before: &[EndError], after: &[EndError], held_out: HeldOut<'
     let pairs: Vec<(f64, f64)> =
         before.iter().zip(&after).map(|(before, after)| (100.0 * (before.0 - after.0), before.1)).collect();
     Some(Compared::of_ratio(percent(&before), percent(&after), &pairs))
+}
+
+/// Sums of final errors and of distances, metres, of what was held out together.
+fn by_unit(ends: &[EndError], held_out: HeldOut<'_>) -> Vec<(f64, f64)> {
+    let mut sums: BTreeMap<(usize, usize), (f64, f64)> = BTreeMap::new();
+    for end in ends {
+        let unit = match held_out {
+            HeldOut::Runs => end.run,
+            HeldOut::Units(units) => (units.of_run.get(&end.run).copied().unwrap_or(usize::MAX), 0),
+        };
+        let sum = sums.entry(unit).or_default();
+        *sum = (sum.0 + end.position_m, sum.1 + end.length_m);
+    }
+    sums.into_values().collect()
 }
 
 impl Compared {
@@ -380,6 +421,34 @@ mod tests {
         assert!(drift(&before, &after[..2], HeldOut::Runs).is_none());
         let standing = [end(0, 0.03, 0.0), end(1, 0.05, 0.0)];
         assert!(drift(&standing, &standing, HeldOut::Runs).is_none());
+    }
+
+    #[test]
+    fn a_drift_has_the_interval_of_its_runs() {
+        let of = Drift::of(&[end(0, 0.03, 1.0), end(1, 0.05, 1.0), end(2, 0.04, 2.0)]).expect("three runs");
+        // 3 %; residuals of 0, 2 and −2 over four metres.
+        let half_width = 12_f64.sqrt() / 4.0 * student_95(2.0);
+        assert!((of.percent - 3.0).abs() < 1e-9 && (of.high - (3.0 + half_width)).abs() < 1e-9, "{of:?}");
+        assert_eq!(of.low, 0.0);
+        // One run has no scatter, and runs of no length have no drift.
+        assert_eq!(Drift::of(&[end(0, 0.03, 1.0)]), None);
+        assert_eq!(Drift::of(&[end(0, 0.03, 0.0), end(1, 0.03, 0.0)]), None);
+    }
+
+    #[test]
+    fn the_nominal_robot_drifts_by_what_its_wheels_are_off() {
+        use crate::small_robot::{fitted, session};
+        let datasets = [session(0, 0.0)];
+        let mut base = AugmentedModel::base(&fitted(&datasets));
+        let of = held_out_drift(&base, None).expect("runs");
+        assert!(of.extended.is_none() && of.distance_m > 0.0);
+        // A nominal robot with wheels 5 % larger ends each straight 5 % too far; closed paths lose nothing by
+        // that, so that the drift is below 5 %, but well above the calibrated one.
+        base.fit.nominal.m_per_rad = base.fit.solution.model.m_per_rad.map(|of| 1.05 * of);
+        let larger = held_out_drift(&base, None).expect("runs");
+        assert!(larger.nominal.percent > 1.0 && larger.nominal.percent < 5.5, "{larger:?}");
+        assert_eq!(larger.calibrated, of.calibrated);
+        assert!(larger.calibrated.percent < 0.5 * larger.nominal.percent, "{larger:?}");
     }
 
     #[test]

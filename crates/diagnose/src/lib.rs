@@ -83,8 +83,9 @@ mod tests;
 pub use alternatives::{Alternative, Status};
 pub use diagnosis::{DiagnoseError, Diagnosis, FittedModel, Options, diagnose, diagnose_large};
 pub use document::{
-    Blind, CandidateCause, Check, Compared, Differences, Document, Finding, Gain, GainLevel, HeldOutUnit, LevelGain,
-    NestedGain, NextExperiment, PlannedSession, Predicted, RowFault, Smallest, Subsample, UnlistedTerm, Value, Verdict,
+    Blind, CandidateCause, Check, Compared, Differences, Document, Drift, Finding, Gain, GainLevel, HeldOutDrift,
+    HeldOutUnit, LevelGain, NestedGain, NextExperiment, PlannedSession, Predicted, RowFault, Smallest, Subsample,
+    UnlistedTerm, Value, Verdict,
 };
 pub use extended_model::{ExtendedModel, ExtendedModelError, ModelledEffect};
 pub use large_log::LargeLog;

@@ -1,8 +1,9 @@
 //! What functions of fits say of a few robots, against what they said before: the files of `tests/golden/`.
+//! What is said of numbers that are none.
 
 use std::fmt::Write;
 
-use dataset::{Dataset, TruthSample, WheelLog};
+use dataset::{Dataset, Run, TruthSample, WheelLog};
 use estimation::{Model, ModelFit, Noise};
 use kinematics::Wheels;
 
@@ -30,6 +31,7 @@ use crate::small_robot::{assert_unmoved, effect, fitted, session, with_effects};
 use crate::sparse_terms::SparseSearch;
 use crate::turn_to_turn::differs_from_turn_to_turn;
 use crate::wald::{cluster_robust_test, p_value_over, tests_of};
+use crate::{Options, diagnose};
 
 /// A robot whose right wheel seems larger in every other run, so that runs differ.
 fn differing() -> Dataset {
@@ -222,4 +224,45 @@ fn a_part_of_runs_is_a_third_at_the_most_and_six_of_them_at_the_least() {
     assert!(part(24, 2500).is_some_and(|runs| (5..=8).contains(&runs)), "{:?}", part(24, 2500));
     // 48000 poses are less than three parts, and of 20 runs 5.46 would be taken.
     assert_eq!((part(24, 2000), part(20, 3000)), (None, None));
+}
+
+type Edit = fn(&mut Run, usize, f64);
+
+fn angles(run: &mut Run) -> &mut Wheels<Vec<f64>> {
+    let WheelLog::Angles(angles) = &mut run.odometry.wheels else { panic!("angles are logged") };
+    angles
+}
+
+/// A log with a value in place of a column: no reader lets one in, and nothing is said of it.
+#[test]
+fn a_log_of_numbers_that_are_none_has_no_diagnosis() {
+    let columns: [(&str, Edit); 5] = [
+        ("x_m", |run, row, value| run.truth[row].x_m = value),
+        ("y_m", |run, row, value| run.truth[row].y_m = value),
+        ("theta_rad", |run, row, value| {
+            let TruthSample { t_s, x_m, y_m, .. } = run.truth[row];
+            run.truth[row] = TruthSample::new(t_s, x_m, y_m, Some(value));
+        }),
+        ("left", |run, row, value| angles(run).left[row] = value),
+        ("right", |run, row, value| angles(run).right[row] = value),
+    ];
+    let said = |edit: Edit, value: f64| {
+        let mut dataset = session(0, 0.0);
+        for run in &mut dataset.runs {
+            // Signs by turns, so that differences overflow too.
+            (1..run.truth.len()).for_each(|row| edit(run, row, if row % 2 == 1 { value } else { -value }));
+        }
+        diagnose(&[dataset], &Options::default()).map(|found| found.document.sentence)
+    };
+    assert!(said(|_, _, _| {}, 0.0).is_ok(), "the sound log");
+    let mut diagnosed = Vec::new();
+    for (name, edit) in columns {
+        for value in [f64::NAN, f64::INFINITY, 1e200] {
+            // A heading that is NaN is one that was not measured, and of any size it is one modulo a turn.
+            if let Some(sentence) = said(edit, value).ok().filter(|_| name != "theta_rad" || value.is_infinite()) {
+                diagnosed.push(format!("{name} = {value:e}: {sentence}"));
+            }
+        }
+    }
+    assert!(diagnosed.is_empty(), "{diagnosed:#?}");
 }

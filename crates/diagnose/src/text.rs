@@ -92,7 +92,7 @@ fn listed(values: &BTreeMap<String, Value>) -> String {
 /// What was diagnosed of a large log, and what was looked for in all of it.
 pub(crate) fn subsample(of: &Subsample) -> String {
     let shown = of.row_faults.iter().map(|fault| {
-        format!("{} in {} stretches, of which {} were diagnosed", fault.id, fault.stretches, fault.diagnosed_stretches)
+        format!("{} in {} stretches, {} of them diagnosed", fault.id, fault.stretches, fault.diagnosed_stretches)
     });
     let shown: Vec<String> = shown.collect();
     let shown = if shown.is_empty() { "none".to_owned() } else { shown.join("; ") };
@@ -140,12 +140,12 @@ fn sentence(finding: &Finding) -> String {
             Doubt::ScattersAlike => format!("{sentence}; other effects that differ from turn to turn scatter alike"),
             Doubt::LowSignificance => format!("{sentence}; its significance is low, and it may be something else"),
             Doubt::OtherGeometry => {
-                format!("{sentence}; beside a geometry that is not the described robot's, it may be something else")
+                format!("{sentence}; with a geometry that is not the described robot's, it may be something else")
             }
             Doubt::FaultyRecords => format!("{sentence}; what is wrong with the records may do the same"),
             Doubt::DoesNotCarryOver => {
                 let why = finding.carry_over.as_ref().map_or("", |of| of.why.as_str());
-                format!("{sentence}; it does not carry over: {why}")
+                format!("{sentence}; it does not hold elsewhere: {why}")
             }
         };
     }

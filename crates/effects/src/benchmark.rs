@@ -43,13 +43,13 @@ pub struct Needs {
     pub payload: bool,
     /// Stamps that jitter.
     pub jitter: bool,
-    /// A length that does not come from the instrument, which its robots do not have: such effects are not
-    /// hidden.
-    pub length: bool,
+    /// What its robots do not have, as a length that does not come from the instrument, or wheels that skid
+    /// in turns: such effects are not hidden.
+    pub others: bool,
 }
 
 impl Needs {
-    pub(crate) const NONE: Self = Self { payload: false, jitter: false, length: false };
+    pub(crate) const NONE: Self = Self { payload: false, jitter: false, others: false };
 
     /// What either needs.
     #[must_use]
@@ -57,7 +57,7 @@ impl Needs {
         Self {
             payload: self.payload || other.payload,
             jitter: self.jitter || other.jitter,
-            length: self.length || other.length,
+            others: self.others || other.others,
         }
     }
 }
@@ -293,14 +293,13 @@ mod tests {
     }
 
     /// Records that have what an effect needs must not tell that it is hidden, so it can be there without any
-    /// harm. What needs a length that robots of the benchmark do not have is never hidden.
+    /// harm. An effect of parts that robots of the benchmark do not have is never hidden.
     #[test]
     fn what_needs_something_of_the_records_can_be_there_without_harm() {
         for id in CATALOGUE {
-            // A length that is known is a record of its own, which the benchmark does not draw.
-            let needs = Needs { length: false, ..description(id).expect("known").benchmark.needs };
+            let needs = Needs { others: false, ..description(id).expect("known").benchmark.needs };
             let found = harmless(id, &host());
-            let has_records = Needs { length: false, ..needs };
+            let has_records = Needs { others: false, ..needs };
             assert_eq!(has_records != Needs::NONE, found.is_some(), "{id}");
             assert!(found.is_none_or(|effect| effect.id() == *id && effect.physical().check().is_ok()), "{id}");
             let bare = HostRobot { payload_kg: Vec::new(), jitter_s: 0.0, ..host() };

@@ -95,14 +95,35 @@ impl Description {
         }
     }
 
-    /// The meaning with sizes; `None` where the finding's own sentence says more.
+    /// What is wrong, with its size; `None` where the finding's own sentence says more.
     #[must_use]
-    pub fn with_values(&self, values: &Estimates<'_>) -> Option<String> {
+    pub fn statement(&self, values: &Estimates<'_>) -> Option<Statement> {
         match self.summary {
             Summary::Finding => None,
-            Summary::Meaning => Some(self.meaning.to_owned()),
-            Summary::WithValues(summary) => Some(summary(values)),
+            Summary::Meaning => Some(Statement { what: self.meaning, size: None }),
+            Summary::WithSize(statement) => Some(statement(values)),
         }
+    }
+}
+
+/// What is wrong and by how much, in words for people: signs are words.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Statement {
+    /// What is wrong.
+    pub what: &'static str,
+    /// By how much, with one standard deviation; `None` where the sizes say little to people.
+    pub size: Option<String>,
+}
+
+impl Statement {
+    pub(crate) const fn of(what: &'static str, size: String) -> Self {
+        Self { what, size: Some(size) }
+    }
+
+    /// As one part of a sentence.
+    #[must_use]
+    pub fn sentence(&self) -> String {
+        self.size.as_ref().map_or_else(|| self.what.to_owned(), |size| format!("{}: {size}", self.what))
     }
 }
 
@@ -113,8 +134,8 @@ pub enum Summary {
     Finding,
     /// By the meaning: the sizes say little to people.
     Meaning,
-    /// By a sentence with the sizes in it.
-    WithValues(fn(&Estimates<'_>) -> String),
+    /// By a statement with the sizes in it, which says in words what a sign means.
+    WithSize(fn(&Estimates<'_>) -> Statement),
 }
 
 /// What excites an effect.
@@ -202,26 +223,37 @@ mod tests {
         }
     }
 
-    /// A sentence with sizes names no size that a fit does not have: it would show a question mark.
+    /// A statement names no size that a fit does not have, which would show a question mark, and no sign.
     #[test]
-    fn sentences_show_the_sizes_that_a_fit_finds() {
-        let mut with_values = 0;
+    fn statements_show_the_sizes_that_a_fit_finds_and_say_signs_in_words() {
+        let mut with_size = 0;
         for id in CATALOGUE {
             let description = description(id).expect("known");
-            let Summary::WithValues(summary) = description.summary else { continue };
+            let Summary::WithSize(statement) = description.summary else { continue };
             let variants =
                 hypothesis(id).and_then(Hypothesis::into_variants).unwrap_or_else(|| panic!("{id} has no sizes"));
             let parameters = variants.iter().flat_map(|variant| variant.term.parameters().iter().map(|of| of.name));
             let names =
                 parameters.chain(variants.iter().flat_map(|variant| variant.fixed.iter().map(|(name, _)| *name)));
-            let values: Estimates<'_> =
-                names.map(|name| (name, Estimate { value: 0.0125, sigma: Some(1e-3) })).collect();
-            let sentence = summary(&values);
-            assert!(!sentence.contains('?') && sentence.contains("± "), "{id}: {sentence}");
-            assert!(summary(&Estimates::default()) != sentence, "{id}: it shows no size");
-            with_values += 1;
+            let names: Vec<&str> = names.collect();
+            let of = |value: f64| {
+                let values = names.iter().map(|name| (*name, Estimate { value, sigma: Some(1e-3) }));
+                statement(&values.collect()).sentence()
+            };
+            let (positive, negative) = (of(0.0125), of(-0.0125));
+            assert!(!positive.contains('?') && positive.contains("± "), "{id}: {positive}");
+            assert!(statement(&Estimates::default()).sentence() != positive, "{id}: it shows no size");
+            // Sizes that are positive by nature keep a sign that a fit should never give them, and so does a
+            // castor's kick, whose sign is that of the turn before.
+            let by_nature =
+                ["missed_counts", "backlash", "turn_slip", "low_speed_truncation", "castor_drag", "castor_kick"];
+            let is_in_words = !negative.contains("-0.") && !negative.contains("-1");
+            assert!(by_nature.contains(id) || is_in_words, "{id}: {negative}");
+            let is_amplitude = ["wheel_eccentricity", "encoder_cycle"].contains(id);
+            assert!(by_nature.contains(id) || is_amplitude || negative != positive, "{id}: {negative}");
+            with_size += 1;
         }
-        assert!(with_values >= 15, "{with_values}");
+        assert!(with_size >= 15, "{with_size}");
     }
 
     /// Properties of faults are of faults alone, single errors of what scatters alone.

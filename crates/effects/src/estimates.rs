@@ -41,6 +41,31 @@ impl Estimates<'_> {
         self.0.get(name).map_or_else(|| "?".to_owned(), |estimate| estimate.shown(scale, unit))
     }
 
+    /// The size of a value without its sign, scaled, in the unit shown.
+    pub(crate) fn magnitude(&self, name: &str, scale: f64, unit: &str) -> String {
+        self.shown(name, if self.is_negative(name) { -scale } else { scale }, unit)
+    }
+
+    /// The first words of a value that is not negative, the second of one that is.
+    pub(crate) fn by_sign(&self, name: &str, positive: &'static str, negative: &'static str) -> &'static str {
+        if self.is_negative(name) { negative } else { positive }
+    }
+
+    /// The size of a value in the unit shown, with the word for its sign behind it.
+    pub(crate) fn with_direction(
+        &self,
+        name: &str,
+        (scale, unit): (f64, &str),
+        positive: &'static str,
+        negative: &'static str,
+    ) -> String {
+        format!("{} {}", self.magnitude(name, scale, unit), self.by_sign(name, positive, negative))
+    }
+
+    fn is_negative(&self, name: &str) -> bool {
+        self.value(name).is_some_and(|value| value < 0.0)
+    }
+
     /// For each wheel whose sine and cosine (`left_sin` and `left_cos`, with a suffix) are significant,
     /// `what` and their amplitude; the larger first.
     pub(crate) fn amplitudes(&self, suffix: &str, scale: f64, unit: &str, what: &str) -> String {
@@ -111,5 +136,15 @@ mod tests {
         assert_eq!(estimates.amplitudes("_rad", 1.0, "", "is off"), "a is off, which one is not determined");
         assert_eq!(estimates.shown("left_sin", 1e3, "mm"), "3.0 ± 1.2 mm");
         assert_eq!(estimates.shown("elsewhere", 1e3, "mm"), "?");
+    }
+
+    #[test]
+    fn a_sign_becomes_a_word() {
+        let of = |value: f64| Estimates::from_iter([("x_m", Estimate { value, sigma: Some(1.2e-3) })]);
+        let shown = |value| of(value).with_direction("x_m", (1e3, "mm"), "ahead", "behind");
+        assert_eq!(
+            (shown(0.025), shown(-0.025)),
+            ("25.0 ± 1.2 mm ahead".to_owned(), "25.0 ± 1.2 mm behind".to_owned())
+        );
     }
 }

@@ -56,7 +56,7 @@ pub const EXEMPT: &[Exemption] = &[
     Exemption {
         condition: OrdinaryCondition::ReceivedStamps,
         findings: &["interval_error", "truth_latency"],
-        why: "the logged intervals are not the true ones, and the log is late beside the instrument",
+        why: "the logged intervals are not the true ones, and the log is late against the instrument",
     },
     Exemption {
         condition: OrdinaryCondition::DriftingClocks,

@@ -32,7 +32,8 @@ pub use benchmark::{Benchmark, FormOf, HostRobot, Needs, OtherForm, ParameterLaw
 pub use channel::Channel;
 pub use covariate::Covariate;
 pub use description::{
-    Description, Excitation, Extrinsic, GeometryRatio, IsolatedError, RecordFault, Restamped, ShownByCounts, Summary,
+    Description, Excitation, Extrinsic, GeometryRatio, IsolatedError, RecordFault, Restamped, ShownByCounts, Statement,
+    Summary,
 };
 pub use effect::{EffectError, PhysicalEffect};
 pub use estimates::{Estimate, Estimates};
@@ -195,6 +196,7 @@ contents! {
     lateral_skid::LateralSkid,
     castor_kick::CastorKick,
     castor_drag::CastorDrag,
+    turn_slip::TurnSlip,
     floor_slope::FloorSlope,
     carpet_nap::CarpetNap,
     encoder_cycle::EncoderCycle,

@@ -337,7 +337,7 @@ mod tests {
             ("geometry", 3),
             ("never", 5),
             ("of the instrument", 7),
-            ("static", 8),
+            ("static", 9),
             ("with an input", 7),
             ("with state", 7),
         ];

@@ -126,16 +126,16 @@ impl SparseTerm {
         let of_wheels = self.channel.is_of_wheels();
         if let Some(own) = covariates.iter().find(|covariate| covariate.is_of_a_wheel() && !of_wheels) {
             let wheels = Channel::WHEELS.map(Channel::name).join(", ");
-            return no_term(format!("\"{}\" goes with {wheels} alone, and not with {channel}", own.name()));
+            return no_term(format!("\"{}\" is a covariate of {wheels} alone, not of {channel}", own.name()));
         }
         let sparse = Sparse { channel: self.channel, covariates };
         if sparse.is_of_rows() && sparse != Sparse::of_rows() {
             let (rows, wheel) = (Covariate::RowLength.name(), Covariate::WheelSpeed.name());
-            return no_term(format!("\"{rows}\" goes with the channel wheels and \"{wheel}\" alone"));
+            return no_term(format!("\"{rows}\" is a covariate of the channel wheels with \"{wheel}\" alone"));
         }
         let covariates = &sparse.covariates;
         let (what, holds) = if self.channel.is_of_instrument() {
-            ("goes with these alone", covariates.iter().all(Covariate::is_of_a_measurement))
+            ("takes these covariates alone", covariates.iter().all(Covariate::is_of_a_measurement))
         } else {
             ("must vanish at standstill and needs one of these", covariates.iter().any(Covariate::vanishes_at_rest))
         };
@@ -304,7 +304,7 @@ impl Forward for State {
             (is_of_instrument, covariate) => !is_of_instrument && covariate.is_a_speed(),
         };
         let exact = self.sparse.covariates.iter().all(is_exact);
-        (!exact).then_some("what it goes with changes within a motion")
+        (!exact).then_some("its covariate changes within a motion")
     }
 
     /// What goes with v or ω alone goes with the distance or the turn, however fast.

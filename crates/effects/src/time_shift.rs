@@ -42,9 +42,15 @@ impl TimeShift {
     pub(crate) fn seen(&self, measurement: &Measurement<'_>, ago_s: f64) -> Pose {
         let ago_s = ago_s.clamp(-LONGEST_S, LONGEST_S);
         let now = (measurement.t_s, measurement.twist);
+        // Terms go on as in the interval before: their phases are those of the instant that was seen.
+        let Twist { v_m_s, omega_rad_s } = measurement.twist_of_terms;
+        let with_terms = |Increment { distance_m, turn_rad }: Increment| Increment {
+            distance_m: distance_m - ago_s * v_m_s,
+            turn_rad: turn_rad - ago_s * omega_rad_s,
+        };
         if ago_s > 0.0 {
             let Increment { distance_m, turn_rad } = self.since(ago_s, now);
-            return Increment { distance_m: -distance_m, turn_rad: -turn_rad }.arc();
+            return with_terms(Increment { distance_m: -distance_m, turn_rad: -turn_rad }).arc();
         }
         let to_s = measurement.t_s - ago_s;
         let ahead =
@@ -55,7 +61,7 @@ impl TimeShift {
                     turn_rad: increment.turn_rad + left_s * twist.omega_rad_s,
                 }
             });
-        ahead.unwrap_or_else(|| self.until(-ago_s, now)).arc()
+        with_terms(ahead.unwrap_or_else(|| self.until(-ago_s, now))).arc()
     }
 
     /// Distance and turn from the instant `ago_s` before now on.
@@ -139,8 +145,14 @@ mod tests {
         let (run, mut shift) = (RunInfo::default(), TimeShift::default());
         speeding_up(|interval| shift.motion(interval), &run);
         let twist = Twist { v_m_s: 1.0, omega_rad_s: 0.0 };
-        let measurement =
-            Measurement { t_s: 1.0, world_from_body: Pose::IDENTITY, twist, record: &NoRecord, run: &run };
+        let measurement = Measurement {
+            t_s: 1.0,
+            world_from_body: Pose::IDENTITY,
+            twist,
+            twist_of_terms: Twist::default(),
+            record: &NoRecord,
+            run: &run,
+        };
         // 0.1 s before and after t = 1 s: ∓0.1 + 0.1²/2 m. Rejects the speed at the measurement alone, ∓0.1.
         assert!((shift.seen(&measurement, 0.1).x_m + 0.095).abs() < 1e-12);
         assert!((shift.seen(&measurement, -0.1).x_m - 0.105).abs() < 1e-12);
@@ -171,8 +183,14 @@ mod tests {
     fn regress_motion_after_a_measurement_is_taken_from_the_record() {
         let (run, shift) = (RunInfo::default(), TimeShift::default());
         let twist = Twist { v_m_s: 9.0, omega_rad_s: 9.0 };
-        let measurement =
-            Measurement { t_s: 1.0, world_from_body: Pose::IDENTITY, twist, record: &ShortRecord, run: &run };
+        let measurement = Measurement {
+            t_s: 1.0,
+            world_from_body: Pose::IDENTITY,
+            twist,
+            twist_of_terms: Twist::default(),
+            record: &ShortRecord,
+            run: &run,
+        };
         // Rejects the speed at the measurement, which coarse counts may have wrong.
         assert!((shift.seen(&measurement, -0.03).x_m - 0.03).abs() < 1e-12);
         // After its end the motion goes on as it is there: 0.06 s at 1 m/s and 0.5 rad/s.

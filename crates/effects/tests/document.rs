@@ -159,7 +159,7 @@ fn meaning(id: &str, description: &Description) -> String {
     let fixed = tried.get(tried.len() / 2).copied();
     let estimate = |(name, value)| (name, Estimate { value, sigma: None });
     let estimates: Estimates<'_> = large.chain(fixed).map(estimate).collect();
-    description.with_values(&estimates).unwrap_or_else(|| description.meaning.to_owned())
+    description.statement(&estimates).map_or_else(|| description.meaning.to_owned(), |of| of.sentence())
 }
 
 fn isolated_error(of: IsolatedError) -> &'static str {

@@ -77,11 +77,13 @@ impl GroupExtrinsics {
 
     /// Is a column of a group determined better than by its prior?
     pub(crate) fn is_shown(&self, response: &GroupResponse, column: Column) -> bool {
-        let Some(at) = self.columns.iter().position(|own| *own == column) else { return false };
-        let Some(inverse) = response.information.clone().cholesky().map(|cholesky| cholesky.inverse()) else {
-            return false;
-        };
-        inverse[(at, at)].sqrt() < MAX_POSTERIOR_TO_PRIOR_SIGMA * prior_sigma(column)
+        self.sigma(response, column).is_some_and(|sigma| sigma < MAX_POSTERIOR_TO_PRIOR_SIGMA * prior_sigma(column))
+    }
+
+    /// Standard deviation of a column of a group, the common values given.
+    pub(crate) fn sigma(&self, response: &GroupResponse, column: Column) -> Option<f64> {
+        let at = self.columns.iter().position(|own| *own == column)?;
+        Some(response.information.clone().cholesky()?.inverse()[(at, at)].sqrt())
     }
 
     /// Gradient and curvature of −log prior of each own column about the common value.

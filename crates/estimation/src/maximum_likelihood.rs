@@ -1,15 +1,17 @@
-//! The order of a fit: the geometry; fixing what is not observable; extrinsics and latency where they predict
-//! held-out runs; thinning while innovations are not white.
+//! The order of a fit: a clock and a drive to start from; the geometry; fixing what is not observable;
+//! extrinsics and latency where they predict held-out runs; thinning while innovations are not white.
 
 use dataset::Session;
+use preflight::StartValues;
+use rayon::prelude::*;
 
 use crate::error::{EstimationError, refuse_wrapped_counters};
-use crate::model::Model;
+use crate::model::Instrument;
 use crate::model_fit::ModelFit;
 use crate::nuisances::{Explained, add_nuisances, explained_by_nuisances};
 use crate::optimizer::ConvergenceCriterion;
 use crate::pass_options::OutlierGate;
-use crate::settings::NOISE_STEP_TOLERANCE;
+use crate::settings::{MIN_START_CLOCK_S, NOISE_STEP_TOLERANCE};
 
 /// What a fit estimates beside the geometry.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,6 +49,23 @@ impl FitSettings {
         self.fit_until(ConvergenceCriterion::Likelihood, sessions)
     }
 
+    /// The instrument's place on the robot by a session, and its latency where windows of motion show a clock
+    /// that is off, with all lengths free; `None` where no frequent poses with headings show them, or the fit
+    /// finds none.
+    #[must_use]
+    pub fn instrument(session: &Session<'_>) -> Option<Instrument> {
+        let start = StartValues::of(session);
+        start.drive?;
+        let clock_s = start.clock_offset_s.unwrap_or(0.0);
+        let ends = ConvergenceCriterion::NoiseShare(NOISE_STEP_TOLERANCE);
+        let mut fit = ModelFit::started(std::slice::from_ref(session), &[start], &[clock_s], ends, false).ok()?;
+        fit.start.body_from_sensor.theta_rad = fit.records.sensor_heading_rad(&fit.start);
+        fit.columns.extend(fit.records.extrinsics());
+        fit.refit(None, &mut []).ok()?;
+        let Instrument { body_from_sensor, latency_s } = fit.solution.model.common_instrument();
+        fit.solution.converged.then_some(Instrument { body_from_sensor, latency_s: clock_s + latency_s })
+    }
+
     /// The fit, with its criterion of convergence.
     pub(crate) fn fit_until<'a>(
         &self,
@@ -54,10 +73,13 @@ impl FitSettings {
         sessions: &[Session<'a>],
     ) -> Result<ModelFit<'a>, EstimationError> {
         refuse_wrapped_counters(sessions)?;
-        let first = sessions.first().ok_or(EstimationError::NoSession)?;
-        let nominal = Model::of(&first.robot.geometry()?, 0);
-        let mut found = ModelFit::before_any_step(sessions, nominal, ends, self.thin_displacements);
-        found.free_extrinsics_if_rotated();
+        let starts: Vec<StartValues> = sessions.par_iter().map(StartValues::of).collect();
+        let seen_s = |start: &StartValues| {
+            start.clock_offset_s.filter(|offset_s| self.nuisances && offset_s.abs() >= MIN_START_CLOCK_S).unwrap_or(0.0)
+        };
+        let clock_s: Vec<f64> = starts.iter().map(seen_s).collect();
+        let mut found = ModelFit::started(sessions, &starts, &clock_s, ends, self.thin_displacements)?;
+        found.free_extrinsics_if_rotated(if self.nuisances { &starts } else { &[] });
         found.first_fit()?;
         found.fix_unobservable()?;
         let explained = if self.nuisances { explained_by_nuisances(&found, self.thin)? } else { Explained::NotTried };

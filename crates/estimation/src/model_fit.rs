@@ -20,7 +20,7 @@ use crate::records::Records;
 use crate::segment::Segment;
 use crate::settings::{
     DRIVE_PRIOR_SIGMA, MAX_AUTOCORRELATION_LAG, MAX_NOMINAL_DEVIATION, MAX_OBSERVABLE_SIGMA, MIN_NAMED_DIRECTION,
-    MIN_OWN_DIRECTION, MIN_RUNS_TO_HOLD_OUT, MIN_SENSOR_POSITION_CHI_SQUARE, ROTATED_SENSOR_RAD, WHITENESS_Z,
+    MIN_OWN_DIRECTION, MIN_RUNS_TO_HOLD_OUT, MIN_SENSOR_POSITION_CHI_SQUARE, WHITENESS_Z,
 };
 use crate::stated_wheels::with_stated_wheels;
 use crate::thinning::{Selection, Thinning};
@@ -70,7 +70,17 @@ impl<'a> ModelFit<'a> {
         ends: ConvergenceCriterion,
         displacements_in_series: bool,
     ) -> Self {
-        let records = Records::of(sessions);
+        Self::of_records(sessions, Records::of(sessions), [nominal.clone(), nominal], ends, displacements_in_series)
+    }
+
+    /// The same of the sessions' records, with the model that fits start from.
+    pub(crate) fn of_records(
+        sessions: &[Session<'_>],
+        records: Records<'a>,
+        [nominal, start]: [Model; 2],
+        ends: ConvergenceCriterion,
+        displacements_in_series: bool,
+    ) -> Self {
         let mut columns = Column::GEOMETRY.to_vec();
         if records.has_gyro() {
             columns.push(Column::GyroScale);
@@ -78,13 +88,13 @@ impl<'a> ModelFit<'a> {
         let stated = sessions.first().map(|session| session.truth_noise).unwrap_or_default();
         let prior = NoisePrior { common_scale: records.common_scale, ..NoisePrior::of(stated) };
         Self {
-            selections: Arc::new(Selection::of(&records, Thinning::NONE, &nominal)),
+            selections: Arc::new(Selection::of(&records, Thinning::NONE, &start)),
             thinning: Thinning::NONE,
             solution: Solution::nothing(&nominal, &prior),
             columns,
             unobservable: Vec::new(),
             records: Arc::new(records),
-            start: nominal.clone(),
+            start,
             nominal,
             prior,
             ends,
@@ -123,19 +133,10 @@ impl ModelFit<'_> {
         }
     }
 
-    /// Frees the extrinsics of a rotated sensor, which the first fit cannot do without.
-    pub(crate) fn free_extrinsics_if_rotated(&mut self) {
-        let heading_rad = self.records.sensor_heading_rad(&self.nominal);
-        if heading_rad.abs() > ROTATED_SENSOR_RAD {
-            self.start.body_from_sensor.theta_rad = heading_rad;
-            self.columns.extend(self.records.extrinsics());
-        }
-    }
-
     /// The first fit. The extrinsics of a sensor of positions are free where it is elsewhere than at the
     /// drive's centre by the dead-reckoned paths, and by the fit: what the paths show may be another effect.
     pub(crate) fn first_fit(&mut self) -> Result<(), EstimationError> {
-        let Some([x_m, y_m]) = self.records.sensor_position_m(&self.nominal) else { return self.refit(None, &mut []) };
+        let Some([x_m, y_m]) = self.records.sensor_position_m(&self.start) else { return self.refit(None, &mut []) };
         let centred = self.clone();
         self.start.body_from_sensor = Pose::new(x_m, y_m, self.start.body_from_sensor.theta_rad);
         self.columns.extend(self.records.extrinsics());
@@ -274,8 +275,8 @@ impl ModelFit<'_> {
             // A direction that has become observable is free again.
             return if was_fixed { self.refit(Some(self.current_values()), &mut []) } else { Ok(()) };
         }
-        // The model goes back to nominal along unobservable directions only.
-        let nominal = [self.nominal.m_per_rad.left, self.nominal.m_per_rad.right, self.nominal.separation_m];
+        // The model goes back to where it began along unobservable directions only.
+        let nominal = [self.start.m_per_rad.left, self.start.m_per_rad.right, self.start.separation_m];
         let mut model = self.solution.model.clone();
         let found = [model.m_per_rad.left, model.m_per_rad.right, model.separation_m];
         let moved = DVector::from_fn(3, |row, _| f64::ln(found[row] / nominal[row]));

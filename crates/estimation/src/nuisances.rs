@@ -285,6 +285,16 @@ impl ModelFit<'_> {
         }
     }
 
+    /// Standard deviation of a column of a group's own instrument, at the common values; `None` where the
+    /// group does not have it for itself or its data do not determine it.
+    #[must_use]
+    pub fn own_sigma(&self, group: (usize, usize), column: Column) -> Option<f64> {
+        let Solution { model, pass, .. } = &self.solution;
+        let response = pass.own.iter().find(|response| response.group == group)?;
+        let own = model.own.as_ref().filter(|own| own.is_shown(response, column))?;
+        own.sigma(response, column)
+    }
+
     /// Is a column of a group's own instrument observable in its data?
     #[must_use]
     pub fn shows(&self, group: (usize, usize), column: Column) -> bool {

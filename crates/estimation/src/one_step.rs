@@ -129,7 +129,8 @@ pub fn fit_large(
     let ids = datasets.iter().map(|blocks| blocks.infos().iter().map(|info| info.id.clone()).collect()).collect();
     first.by_systematic_errors = first.covariance_by_systematic_errors();
     // The subsamples are needed no more.
-    let mut found = first.with_records(Records { ids, ..Records::nothing() });
+    let clock_s = first.records.clock_s.clone();
+    let mut found = first.with_records(Records { ids, clock_s, ..Records::nothing() });
     let mut passes = 0;
     loop {
         passes += 1;
@@ -238,11 +239,13 @@ impl ModelFit<'_> {
     fn part_equations(&self, run: (usize, usize), part: &Dataset) -> Result<PartEquations, EstimationError> {
         let sessions = [part.session()];
         refuse_wrapped_counters(&sessions)?;
-        let records = Records::relative_to(&sessions, self.prior.measurement_sigma()).belonging_to(run);
+        let clock_s = self.records.clock_s.get(run.0).copied().unwrap_or(0.0);
+        let records = Records::relative_to(&sessions, self.prior.measurement_sigma(), &[clock_s], Some(&self.start))
+            .belonging_to(run);
         if records.segments.is_empty() && !records.has_partial() {
             return Ok(PartEquations { run, equations: None, own: None, measurements: 0 });
         }
-        let selections = Selection::of(&records, self.thinning, &self.nominal);
+        let selections = Selection::of(&records, self.thinning, &self.start);
         let (mut model, noise) = (self.solution.model.clone(), &self.solution.noise);
         let is_grouped_by_run = model.own.as_ref().is_some_and(|own| own.grouping == Grouping::Run);
         if is_grouped_by_run {

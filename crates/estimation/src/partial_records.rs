@@ -243,9 +243,9 @@ struct Window {
 impl GyroSettings {
     /// Of a session; what is not stated of its noise comes from its standstills, or from how far it strays
     /// from the wheels.
-    pub(crate) fn of(session: &Session<'_>) -> Self {
+    pub(crate) fn of(session: &Session<'_>, drive: Option<&Model>) -> Self {
         let stated = session.truth_noise.gyro;
-        let noise_rad_per_sqrt_s = stated.noise_rad_per_sqrt_s.or_else(|| noise_from_log(session));
+        let noise_rad_per_sqrt_s = stated.noise_rad_per_sqrt_s.or_else(|| noise_from_log(session, drive?));
         Self { stated, noise_rad_per_sqrt_s }
     }
 
@@ -297,9 +297,8 @@ fn windows(run: &Run, track: &WheelAngleInterpolator<'_>, is_instantaneous: bool
 /// Angle random walk of a gyroscope, rad/√s: half of the mean square of how its mean rate changes from row to
 /// row while the wheels stand. Where they hardly do, the same of how far it strays from the wheels from
 /// window to window, by the median, which holds the wheels' noise too.
-fn noise_from_log(session: &Session<'_>) -> Option<f64> {
+fn noise_from_log(session: &Session<'_>, drive: &Model) -> Option<f64> {
     let instantaneous = session.truth_noise.gyro.is_instantaneous;
-    let nominal = Model::of(&session.robot.geometry().ok()?, 0);
     let (mut standing, mut moving) = (Vec::new(), Vec::new());
     let measures = |run: &&RunView<'_>| run.run().has_gyro();
     for run in session.runs.iter().filter(measures) {
@@ -314,7 +313,7 @@ fn noise_from_log(session: &Session<'_>) -> Option<f64> {
         let strays = |window: &Window| {
             let turned = track.steps(window.from_s, window.to_s)?;
             let turned = turned.into_iter().fold(Wheels::both(0.0), |sum, by| sum.zip_with(by, |a, b| a + b));
-            Some(window.turn_rad - nominal.increment(turned).turn_rad)
+            Some(window.turn_rad - drive.increment(turned).turn_rad)
         };
         let longer = windows(run.run(), &track, instantaneous, GYRO_WINDOW_S);
         moving.extend(longer.windows(2).filter_map(|pair| Some(squared(pair, [strays(&pair[0])?, strays(&pair[1])?]))));

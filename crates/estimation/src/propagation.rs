@@ -146,6 +146,8 @@ pub(crate) struct Propagator<'f, 'a> {
     sampler: Option<KinematicSampler>,
     /// The terms' latest gradients, by each of their parameters.
     pub(crate) gradients: Vec<Pose>,
+    /// What the terms added to the velocity in the latest interval.
+    twist_of_terms: Twist,
     /// Where propagations come from.
     pub(crate) propagations: PropagationSource<'f>,
     /// Derivatives of the propagation interval in force by the terms' parameters.
@@ -171,6 +173,7 @@ impl<'f, 'a> Propagator<'f, 'a> {
             continues: false,
             sampler: None,
             gradients: vec![Pose::IDENTITY; parameters],
+            twist_of_terms: Twist::default(),
             propagations: PropagationSource::Integrated,
             propagation_by_terms: Derivatives::zeros(parameters),
         }
@@ -248,7 +251,8 @@ impl<'f, 'a> Propagator<'f, 'a> {
         } else {
             let record = SegmentRecord { intervals: &self.segment.intervals, model: self.model };
             let world_from_body = self.run_from_chain * pose;
-            let measurement = Measurement { t_s, world_from_body, twist, record: &record, run: self.segment.info };
+            let (twist_of_terms, run) = (self.twist_of_terms, self.segment.info);
+            let measurement = Measurement { t_s, world_from_body, twist, twist_of_terms, record: &record, run };
             self.ask_terms(|term, own| term.measurement(&measurement, own));
             self.turn_levers();
         }
@@ -352,6 +356,7 @@ impl<'f, 'a> Propagator<'f, 'a> {
                     of_terms.y_m += size * gradient.y_m;
                     of_terms.theta_rad += size * gradient.theta_rad;
                 }
+                self.twist_of_terms = Twist::of_motion(of_terms, interval.dt_s);
             }
             // One arc of counts and terms together: where terms undo what stamps jitter by, their squares
             // count.
@@ -416,15 +421,15 @@ impl<'f, 'a> Propagator<'f, 'a> {
         }
     }
 
-    /// The pose of the drive's centre after some intervals, by exact arcs of counts and terms together;
-    /// without derivatives.
+    /// The pose of the drive's centre after some intervals, by exact arcs, without derivatives.
     pub(crate) fn dead_reckon(&mut self, mut pose: Pose, intervals: Range<usize>) -> Pose {
         let Model { m_per_rad, separation_m, .. } = *self.model;
         for interval in &self.segment.intervals[intervals] {
             let travel_m = m_per_rad.zip_with(interval.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
             let Increment { distance_m, turn_rad } = Increment::from_travel(travel_m, separation_m);
             self.term_gradients(interval, travel_m, self.run_from_chain * pose);
-            let Pose { x_m, y_m, theta_rad } = self.sum_of_terms();
+            let of_terms @ Pose { x_m, y_m, theta_rad } = self.sum_of_terms();
+            self.twist_of_terms = Twist::of_motion(of_terms, interval.dt_s);
             let arc = Increment { distance_m: distance_m + x_m, turn_rad: turn_rad + theta_rad }.arc();
             let across_m = self.model.across_m(interval);
             pose = pose * arc * Pose::new(0.0, y_m + across_m, 0.0);

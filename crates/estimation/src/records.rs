@@ -8,7 +8,7 @@
 use std::cell::LazyCell;
 
 use dataset::{CovarianceScale, MapDistortion, Run, RunView, Session, TruthSample};
-use kinematics::{Increment, Pose};
+use kinematics::Pose;
 use rayon::prelude::*;
 
 use crate::model::{Column, Model};
@@ -17,7 +17,7 @@ use crate::noise_shape::NoiseShape;
 use crate::partial_records::{GyroSettings, PartialSegment, partial_segments};
 use crate::poses_between_rows::{take_one_for_each_row, take_those_near_rows};
 use crate::segment::{MeasuredPose, Segment, Start};
-use crate::settings::{AUTOCORRELATION_DECAY, GYRO_SCALE_SIGMA, MIN_CHORD_RATIO, TIME_TOLERANCE_S};
+use crate::settings::{AUTOCORRELATION_DECAY, GYRO_SCALE_SIGMA, TIME_TOLERANCE_S};
 use crate::wheel_angles::{WheelAngleInterpolator, WheelInterval};
 
 /// All that sessions hold for the likelihood.
@@ -37,6 +37,9 @@ pub struct Records<'a> {
     pub unused: Vec<(usize, usize)>,
     /// Ids of all runs by session.
     pub ids: Vec<Vec<String>>,
+    /// By session, what is taken off the stamps of poses and displacements, seconds: how late they were seen
+    /// to be before anything was fitted. A latency that is fitted is what is left.
+    pub clock_s: Vec<f64>,
 }
 
 impl<'a> Records<'a> {
@@ -44,20 +47,32 @@ impl<'a> Records<'a> {
     /// instrument: the one that the first session states, or the prior.
     #[must_use]
     pub fn of(sessions: &[Session<'a>]) -> Self {
+        let stated = sessions.first().and_then(|session| Some(Model::of(&session.robot.geometry().ok()?, 0)));
+        Self::started(sessions, &[], stated.as_ref())
+    }
+
+    /// The same with `clock_s` of each session taken off its stamps, 0 for sessions beyond its end; and a
+    /// drive to start from.
+    pub(crate) fn started(sessions: &[Session<'a>], clock_s: &[f64], start: Option<&Model>) -> Self {
         let stated = sessions.first().map(|session| session.truth_noise).unwrap_or_default();
-        Self::relative_to(sessions, NoisePrior::of(stated).measurement_sigma())
+        Self::relative_to(sessions, NoisePrior::of(stated).measurement_sigma(), clock_s, start)
     }
 
     /// The same relative to given standard deviations of position, metres, and heading, radians.
-    pub(crate) fn relative_to(sessions: &[Session<'a>], reference: [f64; 2]) -> Self {
-        let mut records = Self::nothing();
+    pub(crate) fn relative_to(
+        sessions: &[Session<'a>],
+        reference: [f64; 2],
+        clock_s: &[f64],
+        start: Option<&Model>,
+    ) -> Self {
+        let clock_s = |session: usize| clock_s.get(session).copied().unwrap_or(0.0);
+        let mut records = Self { clock_s: (0..sessions.len()).map(clock_s).collect(), ..Self::nothing() };
         records.gyro_scale_sigma = sessions.iter().find_map(|session| session.truth_noise.gyro.scale_sigma);
         records.common_scale = sessions.iter().all(has_common_scale);
         records.map = sessions.iter().find_map(|session| session.truth_noise.map);
-        let nominal = sessions.first().and_then(|session| Some(Model::of(&session.robot.geometry().ok()?, 0)));
         for (number, session) in sessions.iter().enumerate() {
             // Its noise is sought in all rows of the session.
-            let gyro = LazyCell::new(|| GyroSettings::of(session));
+            let gyro = LazyCell::new(|| GyroSettings::of(session, start));
             records.ids.push(session.runs.iter().map(|run| run.info().id.clone()).collect());
             let track_of = |run: &RunView<'a>| WheelAngleInterpolator::of(run, session.robot);
             let tracks: Vec<_> = session.runs.par_iter().map(track_of).collect();
@@ -70,20 +85,21 @@ impl<'a> Records<'a> {
             let of_run = |(run, base): (&RunView<'a>, &Option<(Segment<'a>, &WheelAngleInterpolator)>)| {
                 let mut segments = Vec::new();
                 let Some((base, track)) = base else { return segments };
-                add_poses(&mut segments, base, track, run.run(), measured_poses(run, reference));
+                let late_s = clock_s(number);
+                add_poses(&mut segments, base, track, run.run(), measured_poses(run, reference, late_s));
                 for poses in &mut segments {
-                    let Some(nominal) = &nominal else { continue };
+                    let Some(nominal) = start else { continue };
                     take_one_for_each_row(poses, &run.odometry().t_s, nominal, reference);
                     take_those_near_rows(poses, nominal, reference);
                 }
-                add_displacements(&mut segments, base, track, run.run());
+                add_displacements(&mut segments, base, track, run.run(), late_s);
                 segments
             };
             let segments: Vec<Vec<Segment<'a>>> = session.runs.par_iter().zip(&bases).map(of_run).collect();
             for (position, ((run, base), segments)) in session.runs.iter().zip(&bases).zip(segments).enumerate() {
                 let (before, partial_before) = (records.segments.len(), records.partial.len());
                 records.segments.extend(segments);
-                if let (Some((base, track)), Some(nominal)) = (base, &nominal) {
+                if let (Some((base, track)), Some(nominal)) = (base, start) {
                     let poses = (&records.segments[before..], before);
                     let lidar = session.truth_noise.lidar;
                     let partial = partial_segments(run, base, poses, track, nominal, (&gyro, lidar));
@@ -107,6 +123,7 @@ impl<'a> Records<'a> {
             common_scale: self.common_scale,
             unused: self.unused.clone(),
             ids: self.ids.clone(),
+            clock_s: self.clock_s.clone(),
         }
     }
 
@@ -125,6 +142,7 @@ impl<'a> Records<'a> {
             common_scale: false,
             unused: Vec::new(),
             ids: Vec::new(),
+            clock_s: Vec::new(),
         }
     }
 
@@ -220,40 +238,6 @@ impl<'a> Records<'a> {
         if measured.any(|measurement| measurement.theta_rad.is_some()) { all } else { &all[..2] }
     }
 
-    /// Approximate heading of the sensor on the robot, radians: from the directions of the measured and the
-    /// dead-reckoned motions between measurements, weighted by length. A spin has no direction; arcs to both
-    /// sides cancel.
-    pub(crate) fn sensor_heading_rad(&self, model: &Model) -> f64 {
-        let (mut dot, mut cross) = (0.0, 0.0);
-        for segment in &self.segments {
-            let mut before = match segment.start {
-                Start::MeasuredPose => None,
-                Start::Origin => Some((Pose::IDENTITY, 0)),
-            };
-            for measurement in &segment.measurements {
-                let Some(theta_rad) = measurement.theta_rad else { return 0.0 };
-                let pose = Pose::new(measurement.x_m, measurement.y_m, theta_rad);
-                if let Some((measured, after)) = before {
-                    let (mut moved, mut distance_m) = (Pose::IDENTITY, 0.0);
-                    for interval in &segment.intervals[after..measurement.after] {
-                        let travel_m = model.m_per_rad.zip_with(interval.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
-                        let increment = Increment::from_travel(travel_m, model.separation_m);
-                        distance_m += increment.distance_m.abs();
-                        moved = moved * increment.arc();
-                    }
-                    // The end of a loop has no direction but that of its errors.
-                    if moved.x_m.hypot(moved.y_m) > MIN_CHORD_RATIO * distance_m {
-                        let measured = measured.to(pose);
-                        dot += moved.x_m * measured.x_m + moved.y_m * measured.y_m;
-                        cross += measured.x_m * moved.y_m - measured.y_m * moved.x_m;
-                    }
-                }
-                before = Some((pose, measurement.after));
-            }
-        }
-        if dot == 0.0 && cross == 0.0 { 0.0 } else { cross.atan2(dot) }
-    }
-
     /// Largest measured distance from the start of a segment, metres; root mean square over the segments.
     #[must_use]
     pub fn extent_m(&self) -> f64 {
@@ -328,14 +312,14 @@ fn has_common_scale(session: &Session<'_>) -> bool {
     is_common && session.runs.iter().all(|run| states_all(run.run()))
 }
 
-/// What the instrument measured in a run; intervals are not counted yet.
-fn measured_poses(run: &RunView<'_>, reference: [f64; 2]) -> Vec<MeasuredPose> {
+/// What the instrument measured in a run, `late_s` before its stamps; intervals are not counted yet.
+fn measured_poses(run: &RunView<'_>, reference: [f64; 2], late_s: f64) -> Vec<MeasuredPose> {
     let Run { truth, truth_sigma, .. } = run.run();
     if truth.is_empty() {
         let poses = run.observed_poses().into_iter();
         return poses
             .map(|(t_s, Pose { x_m, y_m, theta_rad })| MeasuredPose {
-                t_s,
+                t_s: t_s - late_s,
                 x_m,
                 y_m,
                 theta_rad: Some(theta_rad),
@@ -358,7 +342,7 @@ fn measured_poses(run: &RunView<'_>, reference: [f64; 2]) -> Vec<MeasuredPose> {
     let of = |(row, sample): (usize, &TruthSample)| {
         let (variance_factor, shape) = noise_of(row);
         MeasuredPose {
-            t_s: sample.t_s,
+            t_s: sample.t_s - late_s,
             x_m: sample.x_m,
             y_m: sample.y_m,
             theta_rad: sample.theta_rad(),
@@ -445,20 +429,22 @@ fn add_displacements<'a>(
     base: &Segment<'a>,
     track: &WheelAngleInterpolator<'_>,
     run: &Run,
+    late_s: f64,
 ) {
     let mut cursor = track.cursor();
     let mut last_s = f64::NEG_INFINITY;
     for measured in &run.displacements {
-        if run.is_motion_unknown(measured.t0_s, measured.t1_s) {
+        let [from_s, to_s] = [measured.t0_s, measured.t1_s].map(|stamp_s| stamp_s - late_s);
+        if run.is_motion_unknown(from_s, to_s) {
             continue;
         }
-        let Some(turned_rad) = cursor.angle_rad(measured.t0_s) else { continue };
+        let Some(turned_rad) = cursor.angle_rad(from_s) else { continue };
         let wheel_rad = turned_rad.zip_with(base.wheel_rad, |turned, first| first + turned);
         let mut intervals = Vec::new();
-        if cursor.intervals(measured.t0_s, measured.t1_s, &mut intervals) {
+        if cursor.intervals(from_s, to_s, &mut intervals) {
             let pose = Pose::new(measured.dx_m, measured.dy_m, measured.dtheta_rad);
             let measurement = MeasuredPose {
-                t_s: measured.t1_s,
+                t_s: to_s,
                 x_m: pose.x_m,
                 y_m: pose.y_m,
                 theta_rad: Some(pose.theta_rad),
@@ -466,8 +452,8 @@ fn add_displacements<'a>(
                 variance_factor: [1.0; 2],
                 shape: None,
             };
-            let continues = (measured.t0_s - last_s).abs() <= TIME_TOLERANCE_S;
-            last_s = measured.t1_s;
+            let continues = (from_s - last_s).abs() <= TIME_TOLERANCE_S;
+            last_s = to_s;
             segments.push(Segment {
                 start: Start::Origin,
                 continues,

@@ -102,7 +102,7 @@ impl ModelFit<'_> {
     /// Measurements at a spacing of `every_s`, seconds; `None` when a run has too few left.
     fn thinned(&self, every_s: f64, between_s: f64) -> Option<(Thinning, Vec<Selection>)> {
         let thinning = Thinning { every_s: every_s - SPACING_SLACK * between_s, phases: THINNING_PHASES };
-        let selections = Selection::of(&self.records, thinning, &self.nominal);
+        let selections = Selection::of(&self.records, thinning, &self.start);
         (selections[0].mean_measurements(&self.records) >= MIN_MEASUREMENTS_PER_RUN).then_some((thinning, selections))
     }
 

@@ -1,6 +1,7 @@
 //! Why nothing is exported: one variant a reason that a caller can act on.
 
 use kinematics::GeometryError;
+use robot_files::RobotFileError;
 
 /// Why nothing is exported.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -52,6 +53,14 @@ pub enum ExportError {
         /// What does not fit.
         what: String,
     },
+    /// A covariance is made of the wheels' noise, and there is none.
+    #[error(
+        "{place}: it has no noise of the wheels, which a covariance is made of; yair calibrate --method joint fits it"
+    )]
+    NoNoise {
+        /// The calibration file.
+        place: String,
+    },
     /// The noise is no standard deviation.
     #[error("{place}: a noise of {value}; expected a standard deviation, or no [methods.noise]")]
     BadNoise {
@@ -59,6 +68,20 @@ pub enum ExportError {
         place: String,
         /// What stands there.
         value: f64,
+    },
+    /// The format is a whole file.
+    #[error("{format} is a file of its own, and is put into no other; give --out FILE")]
+    OwnFile {
+        /// The format.
+        format: &'static str,
+    },
+    /// A robot's own file does not take the values.
+    #[error("{file}: {source}")]
+    NotInFile {
+        /// The file.
+        file: String,
+        /// Why.
+        source: RobotFileError,
     },
     /// The values are no drive.
     #[error("{place}: {source}")]

@@ -9,6 +9,7 @@ mod causal;
 mod comment;
 mod error;
 pub mod format;
+mod into_file;
 mod log_path;
 mod on_board;
 mod on_board_covariance;
@@ -19,6 +20,7 @@ mod tum;
 
 pub use causal::OnBoardInputs;
 pub use error::ExportError;
+pub use into_file::into_file;
 pub use log_path::LogStart;
 pub use on_board::OnBoardOdometry;
 pub use options::{Lengths, Options};

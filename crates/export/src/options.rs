@@ -16,8 +16,8 @@ pub enum Lengths {
 /// Choices of a user; a format reads those that it knows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Options {
-    /// The controller's node, for formats with one.
-    pub controller: String,
+    /// The controller's node, for formats with one; `None` for the one that the format's robots have.
+    pub controller: Option<String>,
     /// Which lengths.
     pub lengths: Lengths,
     /// Speed at which the covariance of the twist is stated, m/s.
@@ -31,7 +31,7 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Self {
-            controller: "diff_drive_controller".to_owned(),
+            controller: None,
             lengths: Lengths::default(),
             speed_m_s: DEFAULT_SPEED_M_S,
             rate_hz: DEFAULT_RATE_HZ,

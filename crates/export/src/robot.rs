@@ -99,10 +99,6 @@ pub struct CalibratedRobot {
     pub cautions: Vec<String>,
 }
 
-/// The geometry parameters that every robot needs.
-const LENGTHS: [Parameter; 3] =
-    [Parameter::LeftWheelDiameter, Parameter::RightWheelDiameter, Parameter::WheelSeparation];
-
 impl CalibratedRobot {
     /// The result of a method in a calibration file; `robot` is what a dataset states.
     ///
@@ -122,7 +118,8 @@ impl CalibratedRobot {
             }
         }
         let ticks_per_rev = ticks_per_rev(method, robot);
-        let [left, right, separation] = LENGTHS.map(|parameter| length(place, method, parameter, ticks_per_rev, robot));
+        let [left, right, separation] =
+            Parameter::LENGTHS.map(|parameter| length(place, method, parameter, ticks_per_rev, robot));
         let caution =
             |blind: &calib::ReportedBlindness| format!("{} is not determined: {}", blind.parameter, blind.why);
         let mut robot = Self {
@@ -165,7 +162,7 @@ impl CalibratedRobot {
             sigma_m: None,
             nominal_m: nominal_value(&nominal, parameter.key()),
         };
-        let [left, right, wheel_separation] = LENGTHS.map(length);
+        let [left, right, wheel_separation] = Parameter::LENGTHS.map(length);
         let robot = Self {
             place: place.to_owned(),
             name: scenario.name.clone(),
@@ -325,7 +322,7 @@ fn refuse_other_robot(place: &str, method: &MethodReport, robot: Option<&Nominal
     let Some(robot) = robot else { return Ok(()) };
     let other = |what| Err(ExportError::OtherRobot { place: place.to_owned(), what });
     let values = method.parameters.iter().filter_map(|(key, value)| Some((key.clone(), value.value?))).collect();
-    if let Some(what) = (NamedCalibration { name: method.method.clone(), values }).other_robot(robot) {
+    if let Some(what) = NamedCalibration::new(method.method.clone(), values).other_robot(robot) {
         return other(what);
     }
     for (key, reported) in &method.parameters {
@@ -388,6 +385,7 @@ mod tests {
             one_step: None,
             converged: true,
             warnings: Vec::new(),
+            remarks: Vec::new(),
         }
     }
 

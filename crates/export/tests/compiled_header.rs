@@ -214,6 +214,7 @@ fn plain(noise: Option<OdometryNoise>) -> CalibratedRobot {
         one_step: None,
         converged: true,
         warnings: Vec::new(),
+        remarks: Vec::new(),
     };
     for (key, value) in [
         ("left_wheel_diameter_m", 0.161),

@@ -6,8 +6,7 @@ use kinematics::DriveGeometry;
 use serde::{Deserialize, Serialize};
 
 /// The parameters of a geometry, in the order of every array here: left diameter, right diameter, separation.
-pub const GEOMETRY: [Parameter; 3] =
-    [Parameter::LeftWheelDiameter, Parameter::RightWheelDiameter, Parameter::WheelSeparation];
+pub const GEOMETRY: [Parameter; 3] = Parameter::LENGTHS;
 
 /// Left diameter, right diameter and separation, metres.
 pub(crate) fn geometry_m(geometry: &DriveGeometry) -> [f64; 3] {
@@ -50,7 +49,7 @@ impl GeometryEstimate {
             value_m: [0, 1, 2].map(value),
             covariance_m2: calibration.covariance.as_ref().map(rows),
             not_observable: undetermined
-                .map(|blind| Undetermined { parameter: blind.parameter.key().to_owned(), why: blind.why.to_owned() })
+                .map(|blind| Undetermined { parameter: blind.parameter.key().to_owned(), why: blind.why.to_string() })
                 .collect(),
         }
     }

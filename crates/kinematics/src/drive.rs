@@ -114,6 +114,20 @@ pub struct Twist {
     pub omega_rad_s: f64,
 }
 
+impl Twist {
+    /// The mean twist of a motion in the body's frame over some seconds, along and in heading; that of rest
+    /// over none.
+    #[inline]
+    #[must_use]
+    pub fn of_motion(motion: Pose, over_s: f64) -> Self {
+        if over_s > 0.0 {
+            Self { v_m_s: motion.x_m / over_s, omega_rad_s: motion.theta_rad / over_s }
+        } else {
+            Self::default()
+        }
+    }
+}
+
 /// A motion of constant curvature: arc length of the centre, metres, positive ahead, and turn, radians,
 /// counter-clockwise (paper, eq. 1 and 2).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

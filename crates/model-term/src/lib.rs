@@ -130,6 +130,8 @@ pub struct Measurement<'r> {
     pub world_from_body: Pose,
     /// How it moved then, by the counts of as many rows before as after.
     pub twist: Twist,
+    /// What the terms in force add to that, by the interval before.
+    pub twist_of_terms: Twist,
     /// What is recorded around it, for terms by which it was of another instant.
     pub record: &'r dyn MotionRecord,
     /// The run.

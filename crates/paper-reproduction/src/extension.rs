@@ -48,7 +48,7 @@ impl Extension {
         let describe =
             |says, unit, scale, plausible_range, because| Description { says, unit, scale, plausible_range, because };
         match self {
-            Self::None => describe("the paper's model as it stands", "", 1.0, (0.0, 0.0), "nothing is assumed"),
+            Self::None => describe("the paper's model as published", "", 1.0, (0.0, 0.0), "nothing is assumed"),
             Self::CornerWheelbase => describe(
                 "the wheelbase in quarter turns differs from the one in long spins (turn rate, acceleration)",
                 "%",

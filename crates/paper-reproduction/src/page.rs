@@ -79,7 +79,7 @@ impl Reproduction {
         }
         writeln!(
             page,
-            "Figure 6 shows a comb: read to whole millimetres, the lengths of some 484 pulses fall {:.4} mm/pulse apart. Whoever has the paper's histogram can see \
+            "Figure 6 shows a comb: read to whole millimetres, the lengths of some 484 pulses fall {:.4} mm/pulse apart. The paper's histogram shows \
              whether its grid was read finer.\n",
             TABLE_1.left.mean * 1e-3 / 0.5
         )?;
@@ -227,7 +227,7 @@ impl Reproduction {
             )?;
         }
         writeln!(page, "\n{}\n", causes.sentence())?;
-        writeln!(page, "One further measurement on the robot would tell; the one that tells most comes first:\n")?;
+        writeln!(page, "One further measurement on the robot would decide; the most informative comes first:\n")?;
         let columns = causes.fitted.iter().map(|fitted| spoken(fitted.extension)).collect::<Vec<_>>().join(" | ");
         writeln!(page, "| drive and read | measures | σ | {columns} | discriminates by |")?;
         writeln!(page, "| --- | --- | --- |{} --- |", " --- |".repeat(causes.fitted.len()))?;

@@ -5,9 +5,7 @@ use rayon::prelude::*;
 
 use crate::regression::regress;
 use crate::run_log::RunLog;
-use crate::settings::{
-    CLOCK_RATES, CLOCK_STEPS_S, MAX_CLOCK_OFFSET_S, MAX_NEAR_OFFSET_S, MIN_OVERLAP, MIN_WINDOWS, SMALL_RATE_HALVINGS,
-};
+use crate::settings::{CLOCK_RATES, CLOCK_STEPS_S, MAX_CLOCK_OFFSET_S, MIN_OVERLAP, MIN_WINDOWS, SMALL_RATE_HALVINGS};
 use crate::windows::{Measured, Window};
 
 /// A clock of the instrument: a stamp t is of the log's instant (t − offset)/(1 + rate).
@@ -141,10 +139,10 @@ impl Comparison<'_> {
         explain(&pairs, self.measured, self.m_per_rad)
     }
 
-    /// The best offset: near the clock that is, or anywhere.
-    pub(crate) fn best_offset(&self, anywhere: bool) -> Option<BestClock> {
+    /// The best offset: within so many seconds of the clock that is, or anywhere.
+    pub(crate) fn best_offset(&self, within_s: Option<f64>) -> Option<BestClock> {
         let mut best: Option<(f64, Explained)> = None;
-        let (low_s, high_s) = self.range(anywhere)?;
+        let (low_s, high_s) = self.range(within_s)?;
         let (mut from_s, mut to_s) = (low_s, high_s);
         for step_s in CLOCK_STEPS_S {
             let count = ((to_s - from_s) / step_s).ceil() as usize;
@@ -171,9 +169,9 @@ impl Comparison<'_> {
     }
 
     /// Offsets at which some records overlap.
-    fn range(&self, anywhere: bool) -> Option<(f64, f64)> {
-        if !anywhere {
-            return Some((-MAX_NEAR_OFFSET_S, MAX_NEAR_OFFSET_S));
+    fn range(&self, within_s: Option<f64>) -> Option<(f64, f64)> {
+        if let Some(within_s) = within_s {
+            return Some((-within_s, within_s));
         }
         let (mut low_s, mut high_s) = (f64::INFINITY, f64::NEG_INFINITY);
         for (number, run) in self.runs.iter().enumerate() {

@@ -8,7 +8,7 @@ use kinematics::{Side, Wheels};
 
 use crate::alignment::Paired;
 use crate::regression::{Moments, robustly, slope};
-use crate::settings::{GROUPS, MIN_WINDOWS};
+use crate::settings::{GROUPS, MAX_UNEXPLAINED, MIN_WINDOWS};
 
 /// The drive: metres a radian of each wheel (negative: it counts backwards) and the separation (negative: the
 /// robot turns the other way).
@@ -18,6 +18,9 @@ pub(crate) struct GeometryEstimate {
     pub(crate) separation_m: f64,
     /// Relative standard deviations of left, right, separation, by the jackknife.
     pub(crate) sigma: [f64; 3],
+    /// Noise of the wheels beside turns that are hardly larger dilutes the regression: its signs count, and
+    /// its sizes do not.
+    pub(crate) is_diluted: bool,
     /// Direction of the robot in the instrument's frame, radians.
     pub(crate) sensor_rad: f64,
 }
@@ -80,6 +83,7 @@ impl GeometryEstimate {
             m_per_rad: Wheels { left: -turn.per_rad.left * separation_m, right: turn.per_rad.right * separation_m },
             separation_m,
             sigma: [0.0; 3],
+            is_diluted: turn.left > MAX_UNEXPLAINED * turn.whole,
             sensor_rad: (sign * y_m).atan2(sign * x_m),
         })
     }

@@ -12,7 +12,7 @@ pub(crate) enum Kind {
     /// All times are in milliseconds.
     TimeInMilliseconds { row: f64 },
     /// Times of the instrument are of another unit than those of the log.
-    TruthTimeUnit { factor: f64 },
+    TruthTimeUnit { unit: usize, of_truth: bool },
     /// Clocks are apart: truth's stamps are too large by so much.
     ClockOffset { offset_s: f64, sigma_s: f64 },
     /// Truth's clock is fast by this share.
@@ -60,7 +60,7 @@ pub(crate) enum Kind {
     /// All turns go one way.
     OneWayTurns { left: bool },
     /// Parameters that these runs do not determine.
-    NotDetermined { parameters: Vec<&'static str>, turns: bool, partial: bool },
+    NotDetermined { parameters: Vec<&'static str>, why: String },
     /// Tapes, walls, returns or a gyroscope in runs that have displacements too, where no method takes them.
     UnusedMeasurements { gyro_alone: bool },
 }

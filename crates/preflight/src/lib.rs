@@ -1,5 +1,5 @@
 //! Checks of a log before anything is fitted: what is wrong with it, or would make a calibration wrong, and
-//! what mends it.
+//! what mends it; and the values that a fit starts from.
 //!
 //! The motion of the robot in short windows by its wheels is compared with that by the instrument. A
 //! regression of one on the other needs no nominal value: its residual says whether clocks, headings and axes
@@ -8,6 +8,7 @@
 //! silent.
 
 mod alignment;
+mod driven;
 mod geometry_estimate;
 mod kind;
 mod problem;
@@ -17,17 +18,21 @@ mod run_log;
 mod session_check;
 mod settings;
 mod stages;
+mod start_values;
 mod text;
 mod windows;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use dataset::Dataset;
+use kind::Kind;
 use rayon::prelude::*;
 
+pub use driven::Driven;
 pub use problem::{Problem, Severity};
 pub use problems::remedies::{Remedy, WouldDetermine};
 use session_check::SessionCheck;
+pub use start_values::{DriveStart, StartValues};
 
 /// What was found of one robot's datasets.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,6 +52,26 @@ impl Preflight {
         self.problems.iter().all(|problem| problem.severity != Severity::Error)
     }
 }
+
+impl Preflight {
+    /// Takes what a fit says of the parameters that the runs determine in the place of what windows say;
+    /// `open` names the others, each with the reason.
+    pub fn settle(&mut self, open: &BTreeMap<&'static str, String>) {
+        self.problems.retain(|problem| problem.id != NOT_DETERMINED);
+        self.determined.iter_mut().for_each(|(name, is)| *is = !open.contains_key(name));
+        self.would_determine.retain(|would| open.contains_key(would.parameter));
+        let reasons: BTreeSet<&String> = open.values().collect();
+        for why in reasons {
+            let parameters = open.iter().filter(|(_, of)| *of == why).map(|(name, _)| *name).collect();
+            let kind = Kind::NotDetermined { parameters, why: why.clone() };
+            self.problems.push(Problem::new(&kind, Severity::Warning, None, 0.95));
+        }
+        self.problems.sort_by_key(|problem| problem.severity);
+    }
+}
+
+/// The id of the problem that parameters are open.
+pub const NOT_DETERMINED: &str = "not_determined";
 
 /// Checks one robot's sessions.
 #[must_use]

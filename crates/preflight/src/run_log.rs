@@ -51,6 +51,11 @@ pub(crate) struct PartialRow {
     pub(crate) sigma: f64,
 }
 
+/// What each wheel rolls for a radian by the stated robot, metres.
+pub(crate) fn m_per_rad(robot: &NominalRobot) -> Wheels<f64> {
+    Wheels { left: 0.5 * robot.left_wheel_diameter_m, right: 0.5 * robot.right_wheel_diameter_m }
+}
+
 /// The partial measurements of a run; two readings of a wall are one of the motion between them.
 fn partial(run: &Run) -> Vec<PartialRow> {
     let row = |from_s: f64, to_s: f64, part: Part, sigma: f64| PartialRow { from_s, to_s, part, sigma };

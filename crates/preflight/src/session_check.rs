@@ -1,12 +1,12 @@
 //! One session with what was found of it.
 
-use dataset::{Dataset, NominalRobot};
+use dataset::{NominalRobot, Session};
 use kinematics::Wheels;
 
 use crate::alignment::{Clock, Comparison, Explained, Paired, paired};
 use crate::geometry_estimate::{GeometryEstimate, OneDirection};
 use crate::problem::Problem;
-use crate::run_log::RunLog;
+use crate::run_log::{RunLog, m_per_rad};
 use crate::settings::{MAX_WINDOWS, MIN_WINDOWS};
 use crate::windows::{Measured, Reading, windows};
 
@@ -38,17 +38,16 @@ pub(crate) struct Matched {
 
 impl SessionCheck {
     /// A session of which nothing has been checked.
-    pub(crate) fn new(dataset: &Dataset) -> Self {
-        let session = dataset.session();
-        let runs: Vec<RunLog> = session.runs.iter().filter_map(|run| RunLog::of(run, &dataset.robot)).collect();
+    pub(crate) fn new(session: &Session<'_>) -> Self {
+        let runs: Vec<RunLog> = session.runs.iter().filter_map(|run| RunLog::of(run, session.robot)).collect();
         let name = session.name.to_owned();
-        let gyro_scale_sigma = dataset.truth_noise.gyro.scale_sigma;
-        let has_lidar = dataset.truth_noise.lidar.is_some();
-        Self { name, robot: dataset.robot, gyro_scale_sigma, has_lidar, runs, problems: Vec::new(), matched: None }
+        let gyro_scale_sigma = session.truth_noise.gyro.scale_sigma;
+        let has_lidar = session.truth_noise.lidar.is_some();
+        Self { name, robot: *session.robot, gyro_scale_sigma, has_lidar, runs, problems: Vec::new(), matched: None }
     }
 
     pub(crate) fn m_per_rad(&self) -> Wheels<f64> {
-        Wheels { left: 0.5 * self.robot.left_wheel_diameter_m, right: 0.5 * self.robot.right_wheel_diameter_m }
+        m_per_rad(&self.robot)
     }
 
     /// The windows with a reading of the instrument's records and a clock.

@@ -62,6 +62,11 @@ pub(crate) const PRIOR_LOG_ODDS: f64 = 6.9;
 /// Budgeted: records that do not follow the robot leave all of it.
 pub(crate) const MAX_UNEXPLAINED: f64 = 0.6;
 
+/// Largest share of the turns, and of the displacements, that is left unexplained with a correction of
+/// headings, axes or a clock's rate that is named.
+/// Budgeted: a log with the right correction leaves less than a tenth where its noise is ordinary.
+pub(crate) const MAX_LEFT_BY_FIX: f64 = 0.4;
+
 /// Share of the motion that is left unexplained by records that have nothing to do with the robot.
 /// Budgeted: of independent motions a straight line explains 1/n.
 pub(crate) const UNRELATED: f64 = 0.95;
@@ -126,12 +131,16 @@ pub(crate) const MAX_CLOCK_RATE: f64 = 5e-4;
 pub(crate) const MAX_WHEEL_RATIO: f64 = 1.3;
 
 /// As for wheels, of the wheel separation.
-/// Convention: skid steering makes the effective separation 1.5 to 2 times as large.
-pub(crate) const MAX_SEPARATION_RATIO: f64 = 2.2;
+/// Convention: skid steering makes the effective separation 1.5 to 2.5 times as large, 4 at the most.
+pub(crate) const MAX_SEPARATION_RATIO: f64 = 4.0;
 
 /// Relative. A factor is a simple one if it is as near as this.
 /// Convention: wheels are known to a few per cent.
 pub(crate) const FACTOR_TOLERANCE: f64 = 0.15;
+
+/// Relative. A unit that other mistakes are near to is named only if the ratio is as near as this.
+/// Convention: wheels are stated to a per cent.
+pub(crate) const UNIT_TOLERANCE: f64 = 0.01;
 
 /// Standard deviations by which a verdict on a factor or on two sessions must be certain.
 /// Budgeted: errors that are alike for seconds make standard deviations up to three times too small.
@@ -188,9 +197,13 @@ pub(crate) const MIN_ROWS: usize = 20;
 /// Convention: robots creep at centimetres a second.
 pub(crate) const MIN_SPEED_M_S: f64 = 2e-3;
 
-/// Ratio of truth's time to the log's, from which on one of them is in milliseconds.
-/// Budgeted: a run is seen for a thousandth of it, or for a thousand times as long.
-pub(crate) const CLOCK_UNIT_RATIO: [f64; 2] = [300.0, 3000.0];
+/// Ratio of truth's time to the log's, over a unit of [`TIME_UNITS`], that makes it one of that unit.
+/// Budgeted: an instrument sees a run for a third of it, or for three times as long.
+pub(crate) const CLOCK_UNIT_RATIO: [f64; 2] = [0.3, 3.0];
+
+/// Units of time, one second in each: milli-, micro- and nanoseconds.
+/// Derived: from the units.
+pub(crate) const TIME_UNITS: [f64; 3] = [1e3, 1e6, 1e9];
 
 /// Counts, radians or metres a row over the largest usual one, beyond which no wheel goes.
 /// Budgeted: twice the ratio with which outlying rows are found where a fit follows.
@@ -277,6 +290,14 @@ pub(crate) const MIN_DISTANCE_M: f64 = 0.5;
 /// Budgeted: a square has one turn.
 pub(crate) const MIN_TURNING_RAD: f64 = 5.0;
 
+/// Radians. A heading that comes back by more has turned the other way.
+/// Budgeted: steering on straights, and the noise of rates, turn a robot by less.
+pub(crate) const MIN_REVERSAL_RAD: f64 = 0.2;
+
+/// Ratio of the wheel separation to the radius of the path, up to which it is straight.
+/// Convention: within a tenth the wheels roll alike.
+pub(crate) const MAX_STRAIGHT_CURVATURE: f64 = 0.1;
+
 /// Share of the turning that goes one way, from which on it all does.
 /// Budgeted: corrections of a path's heading are a twentieth of its turns.
 pub(crate) const ONE_WAY: f64 = 0.95;
@@ -296,3 +317,12 @@ pub(crate) const MIN_ROUNDED_SHARE: f64 = 1e-4;
 /// As said above.
 /// Budgeted: as said above.
 pub(crate) const MAX_ROUNDED_SHARE: f64 = 5e-4;
+
+/// Relative. Largest standard deviation of a drive that a fit starts from.
+/// Budgeted: steps of a fit are of this size, and a start that is nearer gains nothing.
+pub(crate) const MAX_START_SIGMA: f64 = 0.1;
+
+/// Seconds. Length of the windows in which a gyroscope's turns give a separation to start from.
+/// Budgeted: what wheels of a skid-steered robot err by in a window dilutes the separation by a thirtieth; in
+/// half a second by a sixth.
+pub(crate) const GYRO_WINDOW_S: f64 = 2.0;

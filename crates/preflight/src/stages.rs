@@ -7,7 +7,7 @@ use crate::session_check::SessionCheck;
 
 /// Checks a session.
 pub(crate) fn checked(dataset: &Dataset) -> SessionCheck {
-    let mut check = SessionCheck::new(dataset);
+    let mut check = SessionCheck::new(&dataset.session());
     problems::counters::found(&mut check);
     problems::truth_outliers::found(&mut check);
     problems::time_unit::found(&mut check);

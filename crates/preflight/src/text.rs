@@ -3,6 +3,7 @@
 use kinematics::Side;
 
 use crate::kind::{Kind, MirroredAxis};
+use crate::settings::TIME_UNITS;
 
 /// The problem's name in JSON and in docs/check.md.
 pub(crate) const fn id(kind: &Kind) -> &'static str {
@@ -41,6 +42,9 @@ pub(crate) const fn id(kind: &Kind) -> &'static str {
     }
 }
 
+/// Names of the units of time.
+const TIME_UNIT_NAMES: [&str; 3] = ["milliseconds", "microseconds", "nanoseconds"];
+
 /// What a person reads: what, where, what to do.
 pub(crate) fn sentence(kind: &Kind, runs: Option<&[String]>) -> String {
     let place = place(runs);
@@ -60,9 +64,12 @@ pub(crate) fn sentence(kind: &Kind, runs: Option<&[String]>) -> String {
         Kind::TimeInMilliseconds { row } => format!(
             "t_s is in milliseconds: rows lie {row:.0} \"seconds\" apart; divide the times of all tables by 1000"
         ),
-        Kind::TruthTimeUnit { factor } => {
-            let (table, other) = if *factor < 1.0 { ("truth.csv", "odometry.csv") } else { ("odometry.csv", "truth.csv") };
-            format!("t_s of {table} is in milliseconds, that of {other} in seconds; divide the times of {table} by 1000")
+        Kind::TruthTimeUnit { unit, of_truth } => {
+            let (table, other) = if *of_truth { ("truth.csv", "odometry.csv") } else { ("odometry.csv", "truth.csv") };
+            format!(
+                "t_s of {table} is in {}, that of {other} in seconds; divide the times of {table} by {}",
+                TIME_UNIT_NAMES[*unit], TIME_UNITS[*unit]
+            )
         }
         Kind::ClockOffset { offset_s, sigma_s } => {
             let late = if *offset_s > 0.0 { "late" } else { "early" };
@@ -187,14 +194,8 @@ pub(crate) fn sentence(kind: &Kind, runs: Option<&[String]>) -> String {
             "all turns go {}; drive both ways round, or unequal wheels and a wrong wheel separation look alike",
             if *left { "left" } else { "right" }
         ),
-        Kind::NotDetermined { parameters, partial: true, .. } => format!(
-            "these runs do not determine {}: the gyro, tapes, walls and returns leave it open; measure lengths (distance.csv), whole turns (revisit.csv) or headings (wall.csv), or state scale_sigma under [gyro]",
-            parameters.join(", ")
-        ),
-        Kind::NotDetermined { parameters, turns, .. } => {
-            let why = if *turns { "no distance is driven straight" } else { "the robot hardly turns" };
-            let what = if *turns { "drive straights of some metres too" } else { "drive turns both ways too" };
-            format!("these runs do not determine {}: {why}; {what}", parameters.join(", "))
+        Kind::NotDetermined { parameters, why } => {
+            format!("these runs do not determine {}: {why}", parameters.join(", "))
         }
         Kind::UnusedMeasurements { gyro_alone } => format!(
             "the run's displacements are used, and not its {}, which says less of the same motion; to calibrate from that, leave the run's displacements out",
@@ -245,7 +246,9 @@ pub(crate) fn fix(kind: &Kind) -> Option<String> {
     let corrections = |what: String| Some(format!("[corrections] {what}"));
     match kind {
         Kind::TimeInMilliseconds { .. } => corrections("time_factor = 0.001".to_owned()),
-        Kind::TruthTimeUnit { factor } if *factor < 1.0 => corrections("truth_time_factor = 0.001".to_owned()),
+        Kind::TruthTimeUnit { unit, of_truth: true } => {
+            corrections(format!("truth_time_factor = {}", TIME_UNITS[*unit].recip()))
+        }
         Kind::ClockOffset { offset_s, .. } => corrections(format!("truth_shift_s = {:.3}", -offset_s)),
         Kind::ClockRate { rate } => corrections(format!("truth_time_factor = {:.5}", 1.0 / (1.0 + rate))),
         Kind::HeadingInDegrees => corrections("heading_in_degrees = true".to_owned()),

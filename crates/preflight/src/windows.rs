@@ -4,6 +4,8 @@
 //! linear in the wheels' turns, wherever on the robot the instrument is. Positions alone give a distance, and
 //! a turn of the course from window to window.
 
+use std::f64::consts::GOLDEN_RATIO;
+
 use dataset::TruthSample;
 use kinematics::{sin_cos, sinc, wrap_to_pi};
 
@@ -77,10 +79,17 @@ pub(crate) fn windows(runs: &[RunLog], reading: Reading, most: usize) -> (Vec<Wi
     let most_m_s = OUTLYING_MOTION_RATIO * usual(speed, &all);
     all.retain(|window| speed(window).is_finite() && (speed(window) <= most_m_s || most_m_s == 0.0));
     if all.len() > most {
-        let stride = all.len() as f64 / most as f64;
-        all = (0..most).map(|k| all[(k as f64 * stride) as usize]).collect();
+        all = spread(all.len(), most).map(|index| all[index]).collect();
     }
     (all, if poses { Measured::Poses } else { Measured::Positions })
+}
+
+/// So many of the numbers below a length, one in each equal part, at golden sections of the parts, which fill
+/// an interval most evenly (Weyl 1916). A constant stride would meet a drive that repeats itself always at
+/// one phase, where a clock may not show.
+fn spread(length: usize, most: usize) -> impl Iterator<Item = usize> {
+    let part = length as f64 / most as f64;
+    (0..most).map(move |k| ((k as f64 + (k as f64 * GOLDEN_RATIO).fract()) * part) as usize)
 }
 
 /// Pairs of samples a window apart.
@@ -156,5 +165,21 @@ fn of_positions(number: usize, run: &RunLog, windows: &mut Vec<Window>) {
         });
         before = Some((middle_s, course_rad, distance_m));
         windows.push(Window { run: number, from_s: a.t_s, to_s: b.t_s, ahead_m: distance_m, left_m: 0.0, turn });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_part_of_the_windows_meets_every_phase_of_a_drive_that_repeats_itself() {
+        // Windows of half a second, manoeuvres of 3 s, an hour: a stride of 18 meets one phase of six.
+        let chosen: Vec<usize> = spread(7200, 400).collect();
+        assert!(chosen.windows(2).all(|pair| pair[0] < pair[1]) && chosen[399] < 7200);
+        for phase in 0..6 {
+            let met = chosen.iter().filter(|index| *index % 6 == phase).count();
+            assert!((60..74).contains(&met), "phase {phase}: {met} of 400");
+        }
     }
 }

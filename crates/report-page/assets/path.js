@@ -40,6 +40,8 @@ const WIDTHS = { truth: 5, nominal: 2, calibrated: 2.4, extended: 2, explained: 
 const MOST_ZOOM = 200, LEAST_ZOOM = 0.5;
 /* So many runs are drawn at first: those at the front of the list. */
 const RUNS_AT_FIRST = 24;
+/* A list of more is searched, not read. */
+const RUNS_WITHOUT_SEARCH = 24;
 
 function pathPicture(figure, data) {
   const plot = figure.querySelector(".plot");
@@ -196,12 +198,16 @@ function pathPicture(figure, data) {
   const magnify = truth < 0 || !has(truth) ? [] : [element("label", {}, "Deviations from the measured path drawn", larger)];
   plot.before(element("div", { className: "controls" }, ...tracks), element("div", { className: "controls" }, ...magnify, ...buttons));
   const boxes = runs.map((run) => checkbox(run.name, run.on, (on) => { run.on = on; draw(); }));
-  const all = (on) => { runs.forEach((run, k) => { run.on = on; boxes[k].box.checked = on; }); if (on) reset(); else draw(); };
+  const listed = (k) => !boxes[k].label.hidden;
+  const all = (on) => { runs.forEach((run, k) => { if (listed(k)) { run.on = on; boxes[k].box.checked = on; } }); if (on) reset(); else draw(); };
   const list = element("div", { className: "runs" }, ...boxes.map((box) => box.label));
+  const search = element("input", { type: "search", className: "runs-search", placeholder: "search runs" });
+  search.setAttribute("aria-label", "Search runs by name");
+  search.addEventListener("input", () => boxes.forEach(({ label }, k) => { label.hidden = !runs[k].name.toLowerCase().includes(search.value.trim().toLowerCase()); }));
   plot.after(
     element("p", { className: "readout", textContent: "Drag to move; click the picture, then the wheel, + and − magnify; pinch on a touch screen; 0 or a double click shows all. Dots are the ends of runs." }),
     element("fieldset", {}, element("legend", { textContent: "Runs" }),
-      element("div", { className: "controls" }, button("All", () => all(true), "All runs"), button("None", () => all(false), "No run")), list));
+      element("div", { className: "controls" }, ...(runs.length > RUNS_WITHOUT_SEARCH ? [search] : []), button("All", () => all(true), "All runs of the list"), button("None", () => all(false), "No run of the list")), list));
   reset();
   return { draw, resize: () => { const own = view && home && view.span !== home.span; if (own) draw(); else reset(); } };
 }

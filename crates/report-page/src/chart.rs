@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use crate::embedded_json::embedded;
-use crate::numbers::shown;
+use crate::numbers::{self, shown};
 use crate::role::Role;
 use crate::table::{Cell, Table};
 
@@ -14,13 +14,21 @@ pub struct Axis {
     pub label: String,
     /// Its unit; empty for a number.
     pub unit: String,
+    /// Whether values are spread by their logarithm; all are positive then.
+    pub log: bool,
 }
 
 impl Axis {
     /// An axis.
     #[must_use]
     pub fn new(label: &str, unit: &str) -> Self {
-        Self { label: label.to_owned(), unit: unit.to_owned() }
+        Self { label: label.to_owned(), unit: unit.to_owned(), log: false }
+    }
+
+    /// The same, logarithmic.
+    #[must_use]
+    pub fn logarithmic(self, log: bool) -> Self {
+        Self { log, ..self }
     }
 
     fn text(&self) -> String {
@@ -97,6 +105,7 @@ impl Chart {
         embedded(&json!({
             "x": self.x.text(),
             "y": self.y.text(),
+            "log": [self.x.log, self.y.log],
             "at": rounded(&at),
             "names": if self.names.is_empty() { Value::Null } else { json!(self.names) },
             "series": self.series.iter().map(series).collect::<Vec<Value>>(),
@@ -127,13 +136,9 @@ impl Chart {
     }
 }
 
-/// Numbers with seven significant digits: pictures and cursors show fewer, and a page is to be small.
+/// Numbers with seven significant digits.
 fn rounded(values: &[Option<f64>]) -> Value {
-    let number = |value: &Option<f64>| match value.filter(|value| value.is_finite()) {
-        None => Value::Null,
-        Some(value) => format!("{value:.6e}").parse::<f64>().map_or(Value::Null, |short| json!(short)),
-    };
-    Value::Array(values.iter().map(number).collect())
+    values.iter().map(|value| value.map_or(Value::Null, |value| numbers::rounded(value, 6))).collect()
 }
 
 #[cfg(test)]

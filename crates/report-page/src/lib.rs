@@ -5,11 +5,13 @@
 //! in them can leave (`embedded_json.rs`); the content security policy holds the hashes of the one style
 //! sheet and the scripts (`content_policy.rs`).
 
+mod bars;
 mod chart;
 mod content_policy;
 mod decimation;
 mod embedded_json;
 mod error;
+mod error_picture;
 mod numbers;
 mod page;
 mod path_picture;
@@ -18,8 +20,10 @@ mod role;
 mod sketch;
 mod table;
 
+pub use bars::{Bar, Bars};
 pub use chart::{Axis, Chart, Mark, Series};
 pub use error::PageError;
+pub use error_picture::{ErrorPicture, ModelErrors, RunErrors};
 pub use path_picture::{MAX_DRAWN_RUNS, POINT_BUDGET, PathPicture, PathRun};
 pub use report::{Block, MadeBy, Report, Section, Tile, Tone};
 pub use role::Role;

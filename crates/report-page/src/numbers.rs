@@ -1,5 +1,7 @@
 //! Numbers for the tables beside pictures, and the signs of all numbers that are read.
 
+use serde_json::{Value, json};
+
 /// Significant digits: a picture of a thousand pixels shows no more.
 const DIGITS: i32 = 4;
 
@@ -15,6 +17,13 @@ pub(crate) fn shown(value: f64) -> String {
     } else {
         format!("{value:.3e}")
     }
+}
+
+/// A number for a script with so many digits behind the first: pictures and cursors show fewer, and a page is
+/// to be small. Null of what is no number.
+pub(crate) fn rounded(value: f64, digits: usize) -> Value {
+    let short = || format!("{value:.digits$e}").parse::<f64>().ok();
+    value.is_finite().then(short).flatten().map_or(Value::Null, |value| json!(value))
 }
 
 /// Hyphens before numbers, and in their exponents, as minus signs. Hyphens in names, dates and words stay.

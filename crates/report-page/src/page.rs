@@ -7,6 +7,7 @@ use base64::engine::general_purpose::STANDARD;
 use crate::chart::Chart;
 use crate::content_policy::{SCRIPTS, STYLE, policy};
 use crate::error::PageError;
+use crate::error_picture::ErrorPicture;
 use crate::path_picture::PathPicture;
 use crate::report::{Block, Report};
 use crate::table::{Cell, Table};
@@ -76,6 +77,21 @@ fn paths(picture: &PathPicture) -> askama::Result<String> {
     let drawn = picture.drawn();
     PictureView {
         kind: "path",
+        title: &picture.title,
+        caption: &picture.caption,
+        share: &drawn.share,
+        description: &picture.description(),
+        json: &drawn.json,
+        table: &drawn.table,
+    }
+    .render()
+}
+
+/// Errors along runs as they stand in a page.
+fn errors(picture: &ErrorPicture) -> askama::Result<String> {
+    let drawn = picture.drawn();
+    PictureView {
+        kind: "errors",
         title: &picture.title,
         caption: &picture.caption,
         share: &drawn.share,

@@ -1,6 +1,8 @@
 //! What a page is made of: typed, and free of HTML.
 
+use crate::bars::Bars;
 use crate::chart::Chart;
+use crate::error_picture::ErrorPicture;
 use crate::path_picture::PathPicture;
 use crate::sketch::Sketch;
 use crate::table::Table;
@@ -18,7 +20,9 @@ pub struct Report {
     pub headline: String,
     /// What it means for the robot's odometry.
     pub lead: String,
-    /// The few facts that a reader needs first.
+    /// The quantity that decides, before and after; the first thing that a reader sees.
+    pub bars: Option<Bars>,
+    /// The few facts that a reader needs next.
     pub tiles: Vec<Tile>,
     /// The sections in order.
     pub sections: Vec<Section>,
@@ -123,6 +127,8 @@ pub enum Block {
     Table(Table),
     /// The robot's path.
     Path(PathPicture),
+    /// Errors along each run.
+    Errors(ErrorPicture),
     /// Points and lines over an axis.
     Chart(Chart),
     /// Charts beside each other where there is room.

@@ -13,7 +13,12 @@ pub enum Role {
     ExtendedModel,
     /// What a model says that measurements follow.
     Explained,
+    /// One of several methods, by its number from 0; colours repeat after seven.
+    Method(u8),
 }
+
+/// Keys of methods: of the palette of Okabe and Ito (2008), without yellow.
+const METHODS: [&str; 7] = ["method-1", "method-2", "method-3", "method-4", "method-5", "method-6", "method-7"];
 
 impl Role {
     /// Its name in data and style sheet.
@@ -24,6 +29,7 @@ impl Role {
             Self::Calibrated => "calibrated",
             Self::ExtendedModel => "extended",
             Self::Explained => "explained",
+            Self::Method(number) => METHODS[number as usize % METHODS.len()],
         }
     }
 }

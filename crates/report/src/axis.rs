@@ -46,6 +46,24 @@ pub struct Axis {
 }
 
 impl Axis {
+    /// Its label with the unit.
+    #[must_use]
+    pub fn label(&self) -> &str {
+        &self.label
+    }
+
+    /// Whether it is logarithmic.
+    #[must_use]
+    pub fn is_log(&self) -> bool {
+        self.scale == Scale::Log
+    }
+
+    /// The names of the places 1, 2, …; empty for numbers.
+    #[must_use]
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
     /// A linear axis over all values, labelled `quantity (unit)`.
     pub fn new(quantity: &str, unit: &str) -> Self {
         Self::labelled(format!("{quantity} ({unit})"))

@@ -34,6 +34,17 @@ pub struct Figure {
 }
 
 impl Figure {
+    /// Its panels in order, for other drawings of the same.
+    pub fn panels(&self) -> &[Panel] {
+        &self.panels
+    }
+
+    /// The text under it.
+    #[must_use]
+    pub fn caption_text(&self) -> &str {
+        &self.caption
+    }
+
     /// A figure without panels yet, in one column.
     pub fn new(title: &str) -> Self {
         Self { title: title.to_owned(), caption: String::new(), columns: 1, panels: Vec::new() }

@@ -18,6 +18,11 @@ pub struct Panel {
 }
 
 impl Panel {
+    /// Title, horizontal and vertical axis, and series in order.
+    pub fn parts(&self) -> (&str, &Axis, &Axis, &[Series]) {
+        (&self.title, &self.x, &self.y, &self.series)
+    }
+
     /// A panel without series yet, with a legend. An empty title takes no space if all titles of the row are
     /// empty.
     pub fn new(title: &str, x: Axis, y: Axis) -> Self {

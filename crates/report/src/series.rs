@@ -107,6 +107,12 @@ pub(crate) enum Along {
 }
 
 impl Series {
+    /// Its name, and what is drawn.
+    #[must_use]
+    pub fn parts(&self) -> (&str, &Marks) {
+        (&self.name, &self.marks)
+    }
+
     /// Marks under a name.
     pub fn new(name: &str, marks: Marks) -> Self {
         Self { name: name.to_owned(), marks, colour: None }

@@ -1,4 +1,4 @@
-//! Which files a bag is: one file, or a folder of rosbag2 with its `metadata.yaml`.
+//! Which files a bag is: one file of ROS 2 or ROS 1, or a folder of rosbag2 with its `metadata.yaml`.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -10,7 +10,9 @@ use crate::decompress::{decompress, expansion_limit_bytes};
 use crate::error::RosBagError;
 use crate::known_types::KnownTypes;
 use crate::mcap_file::{self, Channel, Losses, expands_beyond};
+use crate::ros1_file;
 use crate::settings::MAX_METADATA_BYTES;
+use crate::sqlite_file;
 use crate::yaml_size::expanded_nodes;
 
 /// A bag's files in order.
@@ -37,10 +39,9 @@ impl Bag {
             known_types,
         };
         if !path.is_dir() {
-            return match path.extension().and_then(|extension| extension.to_str()) {
-                _ if !path.exists() => Err(no_bag(path, "no such file or folder")),
-                Some("db3") if cfg!(not(feature = "db3")) => Err(RosBagError::Sqlite { path: path.to_owned() }),
-                _ => Ok(bag(vec![path.to_owned()], false, Vec::new())),
+            return match path.exists() {
+                false => Err(no_bag(path, "no such file or folder")),
+                true => Ok(bag(vec![path.to_owned()], false, Vec::new())),
             };
         }
         let metadata = path.join("metadata.yaml");
@@ -61,9 +62,6 @@ impl Bag {
             };
         }
         let found = Metadata::read(&metadata)?;
-        if found.storage == "sqlite3" && cfg!(not(feature = "db3")) {
-            return Err(RosBagError::Sqlite { path: path.to_owned() });
-        }
         let named = found.files.iter().map(|name| path.join(Path::new(name).file_name().unwrap_or_default()));
         let (files, missing): (Vec<PathBuf>, Vec<PathBuf>) = named.partition(|file| file.is_file());
         files.iter().try_for_each(|file| refuse_link_outside(path, file))?;
@@ -74,6 +72,11 @@ impl Bag {
         let remark = |file: &PathBuf| format!("{}: metadata.yaml names it, and it is not there", file.display());
         let remarks = missing.iter().map(remark).collect();
         Ok(bag(files, found.has_compressed_messages, remarks))
+    }
+
+    /// Whether it is one of ROS 1.
+    pub(crate) fn is_ros1(&self) -> bool {
+        self.files.first().is_some_and(|file| ros1_file::is_ros1(file))
     }
 
     /// Visits all messages in the order of the files; gives what was lost.
@@ -87,7 +90,7 @@ impl Bag {
         }
         let mut defined: BTreeMap<String, Channel> = BTreeMap::new();
         let mut visit = |channel: &Channel, log_time_ns: u64, message: &[u8]| {
-            if channel.is_defined() {
+            if channel.is_defined() || channel.message_encoding != "cdr" {
                 return visit(channel, log_time_ns, message);
             }
             let whole = defined.entry(channel.topic.clone()).or_insert_with(|| self.defined(channel));
@@ -134,9 +137,11 @@ impl Bag {
 type Visit<'v> = &'v mut dyn FnMut(&Channel, u64, &[u8]) -> Result<(), RosBagError>;
 
 fn visit_file(file: &Path, visit: Visit<'_>, losses: &mut Losses) -> Result<(), RosBagError> {
-    #[cfg(feature = "db3")]
-    if crate::sqlite_file::is_sqlite(file) {
-        return crate::sqlite_file::visit(file, visit, losses);
+    if ros1_file::is_ros1(file) {
+        return ros1_file::visit(file, visit, losses);
+    }
+    if sqlite_file::is_sqlite(file) {
+        return sqlite_file::visit(file, visit, losses);
     }
     mcap_file::visit(file, visit, losses)
 }
@@ -161,10 +166,7 @@ fn files_of(folder: &Path) -> Result<Vec<PathBuf>, RosBagError> {
     for entry in fs::read_dir(folder).map_err(io)? {
         let path = entry.map_err(io)?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        if name.ends_with(".db3") && cfg!(not(feature = "db3")) {
-            return Err(RosBagError::Sqlite { path: folder.to_owned() });
-        }
-        if [".mcap", ".mcap.zstd", ".db3"].iter().any(|end| name.ends_with(end)) {
+        if [".mcap", ".mcap.zstd", ".db3", ".bag"].iter().any(|end| name.ends_with(end)) {
             files.push(path);
         }
     }
@@ -175,7 +177,6 @@ fn files_of(folder: &Path) -> Result<Vec<PathBuf>, RosBagError> {
 /// What matters of `metadata.yaml`.
 struct Metadata {
     files: Vec<String>,
-    storage: String,
     has_compressed_messages: bool,
 }
 
@@ -200,8 +201,7 @@ impl Metadata {
         if is_message && !format.is_empty() && format != "zstd" {
             return Err(wrong(format!("messages compressed as {format:?}; zstd is read")));
         }
-        let storage = bag["storage_identifier"].as_str().unwrap_or_default().to_owned();
-        Ok(Self { files, storage, has_compressed_messages: is_message })
+        Ok(Self { files, has_compressed_messages: is_message })
     }
 }
 
@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn metadata_says_files_storage_and_compression() {
+    fn metadata_says_files_and_compression() {
         let yaml = |storage: &str, mode: &str| {
             format!(
                 "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: {storage}\n  relative_file_paths:\n    \
@@ -261,8 +261,7 @@ mod tests {
         };
         assert_eq!(of(&yaml("mcap", "MESSAGE")).expect("a bag"), (1, 1, true));
         assert_eq!(of(&yaml("mcap", "FILE")).expect("a bag"), (1, 1, false));
-        let of_sqlite = of(&yaml("sqlite3", ""));
-        assert_eq!(matches!(of_sqlite, Err(RosBagError::Sqlite { .. })), cfg!(not(feature = "db3")), "{of_sqlite:?}");
+        assert_eq!(of(&yaml("sqlite3", "")).expect("a bag"), (1, 1, false));
         for wrong in ["", "a: [", "rosbag2_bagfile_information: 3", "- 1"] {
             assert!(matches!(of(wrong), Err(RosBagError::Metadata { .. })), "{wrong}");
         }

@@ -3,8 +3,11 @@
 //! Four bytes say the representation, then every primitive stands at a multiple of its size, counted from
 //! behind these four. A sequence is its length as uint32 and its elements, a string its length with the final
 //! NUL and its bytes. Reference: OMG DDS-XTypes 1.3, 7.4.1 (XCDR version 1, PLAIN_CDR) and 7.6.3.1.2.
+//!
+//! ROS 1 has neither the four bytes nor places: values stand one behind the other, the lowest byte first, a
+//! string has no NUL, and a type without fields no byte. Reference: <http://wiki.ros.org/msg>.
 
-use crate::definition::{Arity, Definitions, Field, Kind};
+use crate::definition::{Arity, Definitions, Field, Kind, Wire};
 use crate::settings::{MAX_DEPTH, MAX_MESSAGE_BYTES, MAX_VALUES};
 use crate::value::Value;
 
@@ -12,6 +15,10 @@ use crate::value::Value;
 pub(crate) fn decode(definitions: &Definitions, message: &[u8]) -> Result<Value, String> {
     if message.len() > MAX_MESSAGE_BYTES {
         return Err(format!("{} bytes; wheels and poses take at most {MAX_MESSAGE_BYTES}", message.len()));
+    }
+    if definitions.wire == Wire::Ros1 {
+        let whole = Walker { payload: message, before: 0, at: 0, values: 0, is_little_endian: true, definitions };
+        return whole.whole();
     }
     let Some((&[_, representation, _, _], payload)) = message.split_first_chunk::<4>() else {
         return Err(format!("{} bytes, too short for CDR", message.len()));
@@ -23,12 +30,13 @@ pub(crate) fn decode(definitions: &Definitions, message: &[u8]) -> Result<Value,
             return Err(format!("encapsulation 0x{high:02x}{low:02x} is not read; only plain CDR (0x0000, 0x0001) is"));
         }
     };
-    let mut walker = Walker { payload, at: 0, values: 0, is_little_endian, definitions };
-    walker.message(&definitions.root, 0)
+    Walker { payload, before: 4, at: 0, values: 0, is_little_endian, definitions }.whole()
 }
 
 struct Walker<'a> {
     payload: &'a [u8],
+    /// Bytes of the message before the payload.
+    before: usize,
     at: usize,
     /// Decoded so far.
     values: usize,
@@ -37,13 +45,21 @@ struct Walker<'a> {
 }
 
 impl<'a> Walker<'a> {
+    fn whole(mut self) -> Result<Value, String> {
+        self.message(&self.definitions.root, 0)
+    }
+
+    const fn is_cdr(&self) -> bool {
+        matches!(self.definitions.wire, Wire::Cdr)
+    }
+
     fn message(&mut self, name: &str, depth: usize) -> Result<Value, String> {
         if depth > MAX_DEPTH {
             return Err(format!("types are nested more than {MAX_DEPTH} deep"));
         }
         let definitions = self.definitions;
         let fields: &[Field] = definitions.types.get(name).map_or(&[], Vec::as_slice);
-        if fields.is_empty() {
+        if fields.is_empty() && self.is_cdr() {
             // The generators put a byte into a type without fields.
             self.take(1)?;
         }
@@ -85,7 +101,7 @@ impl<'a> Walker<'a> {
                 let length = self.length()?;
                 self.refuse_more_than_remains(length)?;
                 let bytes = self.take(length)?;
-                let bytes = bytes.strip_suffix(&[0]).unwrap_or(bytes);
+                let bytes = bytes.strip_suffix(&[0]).filter(|_| self.is_cdr()).unwrap_or(bytes);
                 Value::Text(String::from_utf8_lossy(bytes).into_owned())
             }
             Kind::Nested(name) => self.message(name, depth + 1)?,
@@ -101,12 +117,12 @@ impl<'a> Walker<'a> {
         if count <= remaining {
             return Ok(());
         }
-        Err(format!("byte {}: a length of {count}, but {remaining} bytes are left", self.at + 4))
+        Err(format!("byte {}: a length of {count}, but {remaining} bytes are left", self.at + self.before))
     }
 
     /// An integer of 1, 2, 4 or 8 bytes, at a multiple of its size.
     fn unsigned(&mut self, size: usize) -> Result<u64, String> {
-        let padding = self.at.wrapping_neg() % size;
+        let padding = if self.is_cdr() { self.at.wrapping_neg() % size } else { 0 };
         self.take(padding)?;
         let is_little_endian = self.is_little_endian;
         let bytes = self.take(size)?.iter();
@@ -115,7 +131,7 @@ impl<'a> Walker<'a> {
     }
 
     fn take(&mut self, count: usize) -> Result<&'a [u8], String> {
-        let ended = || format!("byte {}: the message ends, {count} bytes more were expected", self.at + 4);
+        let ended = || format!("byte {}: the message ends, {count} bytes more were expected", self.at + self.before);
         let taken = self.payload.get(self.at..self.at + count).ok_or_else(ended)?;
         self.at += count;
         Ok(taken)
@@ -207,6 +223,32 @@ mod tests {
         assert!(why.contains("the message ends"), "{why}");
         assert!(decode(&definitions("uint8 s\n"), &[0, 1]).is_err());
         assert!(decode(&definitions("uint8 s\n"), &[0, 3, 0, 0, 1]).expect_err("PL_CDR").contains("0x0003"));
+    }
+
+    #[test]
+    fn in_ros_1_values_stand_one_behind_the_other() {
+        let text = "Header header\nuint8 a\nfloat64 d\nE none\nstring s\nint16[] q\ntime[1] t\nduration u\n===\nMSG: t/E\n\
+                    ===\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n";
+        let of = Definitions { wire: Wire::Ros1, ..definitions(text) };
+        let message = [
+            &[9, 0, 0, 0, 7, 0, 0, 0, 8, 0, 0, 0, 1, 0, 0, 0, b'f'][..],
+            &[5],
+            &1.25_f64.to_le_bytes(),
+            &[2, 0, 0, 0, b'a', 0],
+            &[2, 0, 0, 0, 1, 0, 0xfe, 0xff],
+            &[3, 0, 0, 0, 4, 0, 0, 0],
+            &[0xff, 0xff, 0xff, 0xff, 6, 0, 0, 0],
+        ]
+        .concat();
+        let found = decode(&of, &message).expect("decoded");
+        assert_eq!(["header.frame_id", "s"].map(|path| found.text(path)), [Some("f"), Some("a\0")]);
+        let integers = ["header.seq", "header.stamp.sec", "header.stamp.nanosec", "a", "q[1]", "t[0].sec", "u.sec"];
+        assert_eq!(integers.map(|path| found.integer(path)), [9, 7, 8, 5, -2, 3, -1].map(Some));
+        assert_eq!(found.number("d"), Some(1.25));
+        for length in 0..message.len() {
+            let why = decode(&of, &message[..length]).expect_err("cut off");
+            assert!(why.contains("the message ends") || why.contains("bytes are left"), "{length}: {why}");
+        }
     }
 
     #[test]

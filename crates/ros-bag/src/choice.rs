@@ -25,6 +25,9 @@ const INSTRUMENTS: [&str; 11] = [
 const OWN_POSES: [&str; 13] =
     ["odom", "amcl", "ekf", "ukf", "filtered", "fused", "slam", "goal", "initial", "target", "setpoint", "plan", "cmd"];
 
+/// What is said in place of a topic where none is to be taken; a topic of that name is `/none`.
+pub(crate) const NONE: &str = "none";
+
 /// How good a candidate a topic is, best first; none where it is no candidate.
 type Rank = Option<u8>;
 
@@ -136,6 +139,25 @@ pub(crate) fn gyro(survey: &Survey) -> (Option<&Topic>, Option<String>) {
     }
 }
 
+/// Wheels alone are compared with nothing; `open` says why no gyroscope was taken.
+pub(crate) fn nothing_beside_the_wheels(bag: &std::path::Path, open: Option<String>) -> RosBagError {
+    let (why, flag) = (
+        open.unwrap_or_else(|| "neither poses, nor scans, nor a gyro are taken with the wheels".to_owned()),
+        "--truth TOPIC, --scan TOPIC or --gyro TOPIC".to_owned(),
+    );
+    RosBagError::Undecided { bag: bag.to_owned(), why, flag }
+}
+
+/// The topic that `--gyro` names.
+pub(crate) fn named_gyro<'a>(survey: &'a Survey, topic: &str) -> Result<&'a Topic, RosBagError> {
+    let topic = survey.named("--gyro", topic)?;
+    if topic.type_name == gyro::IMU {
+        return Ok(topic);
+    }
+    let why = format!("no type of a gyroscope; expected {}", gyro::IMU);
+    Err(RosBagError::Unusable { topic: topic.name.clone(), type_name: topic.type_name.clone(), why })
+}
+
 /// What the robot is compared with: poses, scans that show walls, or both.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Reference<'a> {
@@ -144,19 +166,21 @@ pub(crate) struct Reference<'a> {
 }
 
 /// The topics of the reference, of which a user may have named either. Without a name scans are taken where
-/// no topic has poses.
+/// no topic has poses; where the user says [`NONE`] for the poses, nothing is taken unasked.
 pub(crate) fn reference<'a>(
     survey: &'a Survey,
     bag: &std::path::Path,
     [named_truth, named_scan]: [Option<&str>; 2],
 ) -> Result<Reference<'a>, RosBagError> {
     let named = |flag, topic: Option<&str>| topic.map(|topic| survey.named(flag, topic)).transpose();
-    let (named_truth, scan) = (named("--truth", named_truth)?, named("--scan", named_scan)?);
+    let is_none = named_truth == Some(NONE);
+    let named_truth = named("--truth", named_truth.filter(|_| !is_none))?;
+    let scan = named("--scan", named_scan)?;
     if let Some(topic) = scan.filter(|topic| topic.type_name != LASER_SCAN) {
         let why = format!("no type of scans; expected {LASER_SCAN}");
         return Err(RosBagError::Unusable { topic: topic.name.clone(), type_name: topic.type_name.clone(), why });
     }
-    if named_truth.is_some() {
+    if named_truth.is_some() || is_none {
         return Ok(Reference { truth: named_truth, scan });
     }
     let has_poses = survey.topics.values().any(|topic| truth_rank(topic).is_some());
@@ -170,7 +194,7 @@ pub(crate) fn reference<'a>(
 
 /// The topic of the poses.
 fn truth<'a>(survey: &'a Survey, bag: &std::path::Path) -> Result<&'a Topic, RosBagError> {
-    choose(survey, bag, truth_rank, "--truth", || {
+    let found = choose(survey, bag, truth_rank, "--truth", || {
         let is_pose =
             |topic: &&Topic| topic.type_name == TRANSFORMS || TRUTH_TYPES.iter().any(|(of, ..)| *of == topic.type_name);
         let own: Vec<&str> = survey.topics.values().filter(is_pose).map(|topic| &topic.name[..]).collect();
@@ -179,6 +203,13 @@ fn truth<'a>(survey: &'a Survey, bag: &std::path::Path) -> Result<&'a Topic, Ros
             [] => what.to_owned(),
             _ => format!("{what}; {} may be the robot's own estimate", own.join(", ")),
         }
+    });
+    found.map_err(|error| match (error, best(survey, gyro_rank).first()) {
+        (RosBagError::Undecided { bag, why, flag }, Some(gyro)) if flag == "--truth TOPIC" => {
+            let flag = format!("{flag}, or --truth {NONE} for the wheels and the gyro {} alone", gyro.name);
+            RosBagError::Undecided { bag, why, flag }
+        }
+        (error, _) => error,
     })
 }
 
@@ -192,7 +223,7 @@ mod tests {
 
     fn survey(topics: &[Topic]) -> Survey {
         let topics = topics.iter().map(|topic| (topic.name.clone(), topic.clone())).collect();
-        Survey { topics, losses: Vec::new() }
+        Survey { topics, ..Survey::default() }
     }
 
     #[test]
@@ -212,6 +243,16 @@ mod tests {
         assert_eq!(wheels(&without, bag).expect("one").name, "/odom");
         let refused = truth(&without, bag).expect_err("none").to_string();
         assert!(refused.contains("/goal_pose, /odom may be the robot's own estimate; say --truth TOPIC"), "{refused}");
+        // A gyroscope may be all that there is, and then is taken alone; nothing else is then.
+        let imu = topic("/imu", gyro::IMU);
+        let with_gyro = survey(&[all[1].clone(), imu]);
+        let refused = truth(&with_gyro, bag).expect_err("none").to_string();
+        assert!(refused.contains("or --truth none for the wheels and the gyro /imu alone"), "{refused}");
+        let scans = survey(&[topic("/scan", LASER_SCAN), topic("/robot/pose", pose)]);
+        let found = reference(&scans, bag, [Some(NONE), None]).expect("nothing");
+        assert!(found.truth.is_none() && found.scan.is_none());
+        let found = reference(&scans, bag, [Some(NONE), Some("/scan")]).expect("walls alone");
+        assert!(found.truth.is_none() && found.scan.is_some_and(|topic| topic.name == "/scan"));
         let is_own: Vec<bool> = all[1..].iter().map(|topic| is_own_estimate(topic, None)).collect();
         assert_eq!(is_own, [true, true, false]);
         let two = survey(&[topic("/a/pose", pose), topic("/b/pose", pose)]);

@@ -1,7 +1,8 @@
-//! Compressed bytes, with a limit on what they become: zstd and lz4 frames.
+//! Compressed bytes, with a limit on what they become: zstd and lz4 frames, and bz2.
 
 use std::io::Read;
 
+use bzip2::read::BzDecoder;
 use lz4_flex::frame::FrameDecoder;
 use ruzstd::decoding::StreamingDecoder;
 
@@ -21,7 +22,8 @@ pub(crate) struct Decompressed {
     pub(crate) fault: Option<String>,
 }
 
-/// Decompresses as far as it goes, at most to the limit. `compression` is MCAP's name.
+/// Decompresses as far as it goes, at most to the limit. `compression` is the name that MCAP or ROS 1
+/// has for it.
 pub(crate) fn decompress(compression: &str, compressed: &[u8]) -> Decompressed {
     match compression {
         "" | "none" => Decompressed { bytes: compressed.to_vec(), fault: None },
@@ -30,8 +32,9 @@ pub(crate) fn decompress(compression: &str, compressed: &[u8]) -> Decompressed {
             Err(error) => Decompressed { bytes: Vec::new(), fault: Some(format!("zstd: {error}")) },
         },
         "lz4" => read_limited(FrameDecoder::new(compressed)),
+        "bz2" => read_limited(BzDecoder::new(compressed)),
         other => {
-            let fault = format!("compression \"{}\" is not known; zstd and lz4 are", other.escape_debug());
+            let fault = format!("compression \"{}\" is not known; zstd, lz4 and bz2 are", other.escape_debug());
             Decompressed { bytes: Vec::new(), fault: Some(fault) }
         }
     }
@@ -67,10 +70,17 @@ mod tests {
         114, 32, 0, 0, 0, 0,
     ];
 
+    /// The same by Python 3.11's bz2.
+    const BZ2: &[u8] = &[
+        66, 90, 104, 57, 49, 65, 89, 38, 83, 89, 6, 25, 27, 135, 0, 9, 195, 145, 128, 64, 0, 32, 32, 16, 32, 32, 0, 84,
+        51, 64, 38, 170, 49, 149, 32, 218, 144, 101, 72, 54, 164, 27, 82, 14, 46, 228, 138, 112, 161, 32, 12, 50, 55,
+        14,
+    ];
+
     #[test]
-    fn both_formats_give_their_text_back() {
+    fn all_formats_give_their_text_back() {
         let text = "yair ".repeat(1000).into_bytes();
-        for (compression, bytes) in [("zstd", ZSTD), ("lz4", LZ4), ("", &text[..])] {
+        for (compression, bytes) in [("zstd", ZSTD), ("lz4", LZ4), ("bz2", BZ2), ("", &text[..])] {
             let found = decompress(compression, bytes);
             assert_eq!((found.bytes, found.fault), (text.clone(), None), "{compression}");
         }
@@ -78,9 +88,14 @@ mod tests {
 
     #[test]
     fn what_is_cut_off_or_unknown_is_a_fault() {
-        for (compression, bytes) in
-            [("zstd", &ZSTD[..ZSTD.len() - 3]), ("lz4", &LZ4[..20]), ("bz2", LZ4), ("zstd", LZ4)]
-        {
+        for (compression, bytes) in [
+            ("zstd", &ZSTD[..ZSTD.len() - 3]),
+            ("lz4", &LZ4[..20]),
+            ("bz2", LZ4),
+            ("bz2", &BZ2[..BZ2.len() - 2]),
+            ("xz", LZ4),
+            ("zstd", LZ4),
+        ] {
             assert!(decompress(compression, bytes).fault.is_some(), "{compression}");
         }
     }

@@ -39,15 +39,26 @@ pub(crate) struct Field {
     pub(crate) arity: Arity,
 }
 
+/// How a message's values follow each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Wire {
+    /// ROS 2: CDR.
+    Cdr,
+    /// ROS 1: one behind the other.
+    Ros1,
+}
+
 /// A type and all types inside it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Definitions {
+    pub(crate) wire: Wire,
     pub(crate) root: String,
     pub(crate) types: BTreeMap<String, Vec<Field>>,
 }
 
 impl Definitions {
-    /// Reads a schema's text; an error says what and in which line of it.
+    /// Reads a schema's text, which is in the same language in ROS 1; an error says what and in which line of
+    /// it.
     pub(crate) fn parse(root: &str, text: &str) -> Result<Self, String> {
         let root = full_name(root, "");
         let (mut types, mut name, mut fields) = (BTreeMap::new(), root.clone(), Vec::new());
@@ -89,7 +100,7 @@ impl Definitions {
                 }
             }
         }
-        Ok(Self { root, types })
+        Ok(Self { wire: Wire::Cdr, root, types })
     }
 
     /// Full names of the types of a type's own fields; an error says what is wrong in which line.
@@ -117,6 +128,15 @@ pub(crate) fn full_name(name: &str, inside: &str) -> String {
             Some((package, _)) => format!("{package}/{name}"),
             None => name.to_owned(),
         },
+        _ => name.to_owned(),
+    }
+}
+
+/// What ROS 2 calls a type of ROS 1: `package/msg/Type`.
+pub(crate) fn ros2_name(name: &str) -> String {
+    match name.split_once('/') {
+        Some(("tf", "tfMessage")) => "tf2_msgs/msg/TFMessage".to_owned(),
+        Some((package, name)) if !name.contains('/') => format!("{package}/msg/{name}"),
         _ => name.to_owned(),
     }
 }
@@ -199,6 +219,12 @@ mod tests {
         );
         assert_eq!(found.types["my_msgs/Outer"][5].kind, Kind::Nested("my_msgs/Inner".to_owned()));
         assert_eq!(found.types["builtin_interfaces/Time"].len(), 2);
+    }
+
+    #[test]
+    fn types_of_ros_1_have_the_names_of_ros_2() {
+        let names = ["std_msgs/Int32", "tf/tfMessage", "nav_msgs/msg/Odometry", "Odd"].map(ros2_name);
+        assert_eq!(names, ["std_msgs/msg/Int32", "tf2_msgs/msg/TFMessage", "nav_msgs/msg/Odometry", "Odd"]);
     }
 
     #[test]

@@ -14,8 +14,8 @@ pub enum RosBagError {
         /// Its reason.
         source: std::io::Error,
     },
-    /// Neither a bag's folder nor an MCAP file.
-    #[error("{path}: {why}; expected a folder of rosbag2 with its metadata.yaml, or one .mcap file")]
+    /// Neither a bag's folder nor a file of a bag.
+    #[error("{path}: {why}; expected a folder of rosbag2 with its metadata.yaml, or one .mcap, .db3 or .bag file")]
     NoBag {
         /// What was given.
         path: PathBuf,
@@ -31,7 +31,7 @@ pub enum RosBagError {
         target: PathBuf,
     },
     /// `metadata.yaml` does not say what rosbag2 writes there.
-    #[error("{file}: {why}; name one .mcap file instead, or let `ros2 bag reindex` write it anew")]
+    #[error("{file}: {why}; name one file of the bag instead, or let `ros2 bag reindex` write it anew")]
     Metadata {
         /// The file.
         file: PathBuf,
@@ -46,14 +46,17 @@ pub enum RosBagError {
         /// What is wrong, and what to do.
         why: String,
     },
-    /// A bag in SQLite, in a build that reads none.
+    /// Beside a file of SQLite stands a log that was not yet written into it.
     #[error(
-        "{path}: a bag in SQLite, which this build does not read. Build with the feature db3 (cargo install --path . --locked --features db3; it needs a C compiler), or convert the bag: write \"output_bags: [{{uri: converted, storage_id: mcap, all: true}}]\" into to-mcap.yaml, then `ros2 bag convert -i {} -o to-mcap.yaml`, and import converted",
-        path.display()
+        "{file}: it is not whole: {beside} holds what its recorder had not yet written into it; let SQLite do that (sqlite3 {} \"PRAGMA integrity_check\"), or take {} away to read the file without it",
+        file.display(),
+        beside.display()
     )]
-    Sqlite {
-        /// The file or folder.
-        path: PathBuf,
+    Unfinished {
+        /// The bag's file.
+        file: PathBuf,
+        /// The log beside it.
+        beside: PathBuf,
     },
     /// A file that says little becomes much by decompression.
     #[error("{file}: it holds more than {} MiB when decompressed; split the recording (`ros2 bag convert`), or leave out the topics of images", limit_bytes >> 20)]
@@ -71,6 +74,9 @@ pub enum RosBagError {
         /// What was lost.
         why: String,
     },
+    /// A file numbers its topics by 16 bits.
+    #[error("more than 65535 topics; give fewer calibrations")]
+    TooManyTopics,
     /// A topic's definition is not one that can be read.
     #[error("topic {topic}: {type_name}: {why}")]
     Definition {

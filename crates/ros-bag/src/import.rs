@@ -2,12 +2,12 @@
 
 use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use dataset::import::csv::{Rates, RobotGiven};
 use dataset::{
     Dataset, ExtraChannel, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, WheelLog,
-    moving_pieces, wrap_warnings,
+    moving_pieces, recognise_protocols, wrap_warnings,
 };
 use kinematics::{DriveGeometry, Wheels};
 
@@ -18,7 +18,7 @@ use crate::error::RosBagError;
 use crate::gyro::IMU;
 use crate::gyro_column::GyroColumn;
 use crate::recorded::recorded;
-use crate::rows::{self, BothRows, Others, RECEIPT_MARGIN_S, Rows, WheelRows, WheelSource};
+use crate::rows::{self, BothRows, GyroRows, Others, RECEIPT_MARGIN_S, Rows, WheelRows, WheelSource};
 use crate::scan_walls::{self, RunSpan};
 use crate::took::Took;
 use crate::topics::{Survey, Topic};
@@ -44,12 +44,12 @@ const MAX_GAP_OF_RATES_S: f64 = 1.0;
 pub struct Options {
     /// Topic of the wheels, or `LEFT_TOPIC[.field],RIGHT_TOPIC[.field]`.
     pub wheels: Option<String>,
-    /// Topic of the poses of an outside instrument.
+    /// Topic of the poses of an outside instrument; `none` where wheels and a gyroscope are all there is.
     pub truth: Option<String>,
     /// Topic of the scans of a lidar in which walls are sought; where none is said, the only one of a bag
     /// that has no poses.
     pub scan: Option<String>,
-    /// Topic of a gyroscope's rates; where none is said, the only one of the bag.
+    /// Topic of a gyroscope's rates; where nothing is said, the only one of the bag; `none` leaves it out.
     pub gyro: Option<String>,
     /// Which joints or fields are the wheels.
     pub fields: WheelFields,
@@ -64,6 +64,8 @@ pub struct Options {
     pub cut_s: Option<f64>,
     /// The robot.
     pub robot: RobotGiven,
+    /// Joints of the wheels by the robot's own files, for topics that hold them.
+    pub known_wheels: Option<Wheels<String>>,
 }
 
 /// A dataset from a bag.
@@ -77,26 +79,29 @@ pub struct FromBag {
     pub warnings: Vec<String>,
 }
 
-/// Reads a bag as a dataset.
+/// The dataset of a bag whose topics are known.
 ///
 /// # Errors
 /// [`RosBagError`] of the first fault; what could not be read of a damaged bag is a warning.
-pub fn import(path: &Path, options: &Options) -> Result<FromBag, RosBagError> {
-    let bag = Bag::open(path, &options.definitions)?;
-    let survey = Survey::of(&bag)?;
+pub(crate) fn import_of(bag: &Bag, survey: &Survey, options: &Options) -> Result<FromBag, RosBagError> {
+    let path = &bag.path;
     let wheels = match &options.wheels {
-        Some(topics) => match WheelPair::parse(&survey, topics, options.fields.quantity)? {
+        Some(topics) => match WheelPair::parse(survey, topics, options.fields.quantity)? {
             Some(pair) => WheelTopics::Two(pair),
             None => WheelTopics::One(survey.named("--wheels", topics)?),
         },
-        None => WheelTopics::One(choice::wheels(&survey, path)?),
+        None => WheelTopics::One(choice::wheels(survey, path)?),
     };
     let named = [&options.truth, &options.scan].map(Option::as_deref);
-    let Reference { truth, scan } = choice::reference(&survey, path, named)?;
+    let Reference { truth, scan } = choice::reference(survey, path, named)?;
     let (gyro, gyro_open) = match &options.gyro {
-        Some(topic) => (Some(named_gyro(&survey, topic)?), None),
-        None => choice::gyro(&survey),
+        Some(topic) if topic == choice::NONE => (None, None),
+        Some(topic) => (Some(choice::named_gyro(survey, topic)?), None),
+        None => choice::gyro(survey),
     };
+    if truth.is_none() && scan.is_none() && gyro.is_none() {
+        return Err(choice::nothing_beside_the_wheels(path, gyro_open));
+    }
     if let Some(truth) = truth.filter(|truth| wheels.has(&truth.name)) {
         let (topic, type_name) = (truth.name.clone(), truth.type_name.clone());
         let why = "its poses are computed from its wheels; --truth takes poses of an outside instrument".to_owned();
@@ -115,11 +120,11 @@ pub fn import(path: &Path, options: &Options) -> Result<FromBag, RosBagError> {
             (WheelSource::Two(pair, resampling), what, None)
         }
     };
-    let reader = |truth: &Topic| TruthReader::new(truth, options.truth_frames.as_ref());
+    let reader = |truth: &Topic| TruthReader::new(truth, options.truth_frames.as_ref(), &survey.mounted);
     let truth_reader = truth.map(reader).transpose()?;
     let of_truth = truth.map(|topic| &topic.name[..]).zip(truth_reader.as_ref());
     let others = Others { truth: of_truth, gyro: gyro.map(|topic| &topic.name[..]) };
-    let both = rows::read(&bag, &source, others)?;
+    let both = rows::read(bag, &source, others)?;
 
     let given = RobotGiven { counter_bits: options.robot.counter_bits.or(counter_bits), ..options.robot };
     let is_counted = both.quantity == WheelQuantity::Ticks;
@@ -140,16 +145,22 @@ pub fn import(path: &Path, options: &Options) -> Result<FromBag, RosBagError> {
     }
     let clocks = clocks(&both, &mut warnings)?;
     warnings.extend(gyro_open);
-    let gyro = gyro_column(&both, clocks[0], options, &mut warnings)?;
+    let must_have_gyro = options.gyro.is_some() || (truth.is_none() && scan.is_none());
+    let gyro = gyro_column(&both, clocks[0], (options, must_have_gyro), &mut warnings)?;
     let has_gyro = gyro.is_some();
-    let (mut dataset, spans) = assemble(&both, clocks, gyro, (robot, geometry), path, options, &mut warnings)?;
+    let (mut dataset, spans) = assemble(&both, clocks, gyro, (robot, geometry), bag, options, &mut warnings)?;
+    if truth.is_none() && scan.is_none() {
+        dataset.runs.retain(Run::has_gyro);
+        refuse_no_run(&dataset, &both, options)?;
+    }
     if let Some(truth) = own_estimate {
         warnings.extend(truth::scale_covariances(&mut dataset, &truth.name));
     }
     let mut scans = None;
     if let Some(scan) = scan {
-        let of = (&bag, scan, clocks[0]);
-        scans = Some((&scan.name[..], scan_walls::add_walls(&mut dataset, &spans, of, &both.frames, &mut warnings)?));
+        let of = (bag, scan, clocks[0]);
+        scans =
+            Some((&scan.name[..], scan_walls::add_walls(&mut dataset, &spans, of, &survey.mounted, &mut warnings)?));
         dataset.runs.retain(|run| !run.truth.is_empty() || !run.walls.is_empty());
         let notes = dataset.provenance.notes.take().unwrap_or_default();
         dataset.provenance.notes = Some(format!("{notes}, walls of {} ({})", scan.name, scan.type_name));
@@ -175,28 +186,31 @@ impl WheelTopics<'_> {
     }
 }
 
-/// The topic that `--gyro` names.
-fn named_gyro<'a>(survey: &'a Survey, topic: &str) -> Result<&'a Topic, RosBagError> {
-    let topic = survey.named("--gyro", topic)?;
-    if topic.type_name == IMU {
-        return Ok(topic);
+/// Of a dataset that has a gyroscope alone beside the wheels.
+fn refuse_no_run(dataset: &Dataset, both: &BothRows, options: &Options) -> Result<(), RosBagError> {
+    match (&both.gyro, options.cut_s) {
+        _ if !dataset.runs.is_empty() => Ok(()),
+        (_, Some(cut_s)) => Err(RosBagError::NothingLeft { cut_s }),
+        (Some(GyroRows { rows, .. }), None) => {
+            let why = "its rates span no interval between two rows of the wheels; record both at once".to_owned();
+            Err(RosBagError::Unusable { topic: rows.topic.clone(), type_name: rows.type_name.clone(), why })
+        }
+        (None, None) => Ok(()),
     }
-    let why = format!("no type of a gyroscope; expected {IMU}");
-    Err(RosBagError::Unusable { topic: topic.name.clone(), type_name: topic.type_name.clone(), why })
 }
 
-/// The rates of the gyroscope. One that nobody named and that cannot be used is left out with a warning.
+/// The rates of the gyroscope. One that is not needed and that cannot be used is left out with a warning.
 fn gyro_column(
     both: &BothRows,
     clock: Clock,
-    options: &Options,
+    (options, is_needed): (&Options, bool),
     warnings: &mut Vec<String>,
 ) -> Result<Option<GyroColumn>, RosBagError> {
     let Some(rows) = &both.gyro else { return Ok(None) };
     let span_ns = ends(&both.wheels.times, clock);
     match GyroColumn::new(rows, clock, span_ns, options.cut_s.is_some(), warnings) {
         Ok(column) => Ok(Some(column)),
-        Err(why) if options.gyro.is_none() => {
+        Err(why) if !is_needed => {
             warnings.push(format!("{why}; the gyroscope was left out"));
             Ok(None)
         }
@@ -260,7 +274,7 @@ fn assemble(
     clocks: [Clock; 2],
     mut gyro: Option<GyroColumn>,
     (robot, geometry): (NominalRobot, DriveGeometry),
-    path: &Path,
+    bag: &Bag,
     options: &Options,
     warnings: &mut Vec<String>,
 ) -> Result<(Dataset, Vec<RunSpan>), RosBagError> {
@@ -381,17 +395,19 @@ fn assemble(
         both.gyro.as_ref().filter(|_| has_rates).map(|gyro| format!(", yaw rates of {} ({IMU})", gyro.rows.topic));
     let of_poses = both.truth.as_ref().map(|poses| format!(", poses of {} ({})", poses.topic, poses.type_name));
     let notes = format!(
-        "ROS 2 bag: wheels of {} ({}){}{}",
+        "{} bag: wheels of {} ({}){}{}",
+        if bag.is_ros1() { "ROS 1" } else { "ROS 2" },
         both.wheels.topic,
         both.wheels.type_name,
         of_poses.unwrap_or_default(),
         rates.unwrap_or_default()
     );
-    let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+    let name = bag.path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
     let recorded = recorded(both.wheels.times.iter().map(|times| times.received_ns));
     let provenance = Provenance { name, notes: Some(notes), recorded, ..Provenance::default() };
     let truth_noise = TruthNoise::default();
     let mut dataset = Dataset { provenance, robot, truth_noise, points: Vec::new(), runs };
+    recognise_protocols(&mut dataset);
     dataset.carry_wheel_angles();
     Ok((dataset, spans))
 }

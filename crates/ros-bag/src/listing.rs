@@ -52,6 +52,9 @@ pub struct Listing {
     pub flags: Vec<String>,
     /// Whether the wheels are counted, so that the counts of a turn are needed.
     pub is_counted: bool,
+    /// The topic of the robot's description, where the bag has it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub robot_description: Option<String>,
     /// What could not be read.
     pub warnings: Vec<String>,
 }
@@ -93,6 +96,7 @@ pub fn list(path: &Path, definitions: &[PathBuf]) -> Result<Listing, RosBagError
         gyro: suggested(&survey, gyro_rank).map(|topic| topic.name.clone()),
         scan: suggested(&survey, scan_rank).map(|topic| topic.name.clone()),
         flags,
+        robot_description: survey.description.as_ref().map(|(topic, _)| topic.clone()),
         topics: survey.topics.values().map(listed).collect(),
         warnings: survey.losses,
     })

@@ -9,11 +9,12 @@ use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
-use mcap::records::op;
 use ruzstd::decoding::StreamingDecoder;
 
 use crate::decompress::{decompress, expansion_limit_bytes};
+use crate::definition::ros2_name;
 use crate::error::RosBagError;
+use crate::mcap_records::{MAGIC, op};
 use crate::record_fields::Fields;
 use crate::resync::next_chunk;
 use crate::settings::{MAX_BREAKS, MAX_CHUNK_BYTES, MAX_DECLARED_BYTES, MAX_REPORTED};
@@ -31,7 +32,7 @@ pub(crate) struct Channel {
 impl Channel {
     /// Whether the file says how its messages are to be read, in a language that is read here.
     pub(crate) fn is_defined(&self) -> bool {
-        self.schema_encoding == "ros2msg" && !self.definition.trim().is_empty()
+        ["ros2msg", "ros1msg"].contains(&&self.schema_encoding[..]) && !self.definition.trim().is_empty()
     }
 
     /// Of its texts.
@@ -91,13 +92,15 @@ fn visit_within(
         Box::new(file)
     };
     let mut magic = Vec::new();
-    reader.by_ref().take(mcap::MAGIC.len() as u64).read_to_end(&mut magic).map_err(io)?;
+    reader.by_ref().take(MAGIC.len() as u64).read_to_end(&mut magic).map_err(io)?;
     match &magic[..] {
-        magic if *magic == *mcap::MAGIC => {}
+        magic if *magic == *MAGIC => {}
         [] => return Err(no_bag(path, "an empty file".to_owned())),
-        magic if b"SQLite format 3".starts_with(magic) => return Err(RosBagError::Sqlite { path: path.to_owned() }),
+        magic if b"SQLite format 3".starts_with(magic) => {
+            return Err(no_bag(path, "a bag in SQLite that is compressed as a whole; `zstd -d` it first".to_owned()));
+        }
         magic if b"#ROSBAG V2.0".starts_with(magic) => {
-            let why = "a bag of ROS 1; convert it with `rosbags-convert --src FILE --dst converted --dst-storage mcap`";
+            let why = "a bag of ROS 1 that is cut off, or compressed as a whole; then `zstd -d` it first";
             return Err(no_bag(path, why.to_owned()));
         }
         _ => return Err(no_bag(path, "no MCAP file by its first bytes".to_owned())),
@@ -250,7 +253,7 @@ impl<V: FnMut(&Channel, u64, &[u8]) -> Result<(), RosBagError>> Reading<'_, V> {
             );
             return Ok(());
         }
-        if is_cut && body.ends_with(mcap::MAGIC) {
+        if is_cut && body.ends_with(MAGIC) {
             // The file's end is there: bytes are missing or wrong inside, and no checksum tells which.
             self.lose(start, "a chunk is longer than the rest of the file; it is damaged and was left out");
             return Ok(());
@@ -346,11 +349,12 @@ impl<V: FnMut(&Channel, u64, &[u8]) -> Result<(), RosBagError>> Reading<'_, V> {
         let (topic, message_encoding) = (fields.text()?, fields.text()?);
         let schema = self.schemas.get(&schema);
         let of = |field: fn(&Schema) -> &String| schema.map(field).cloned().unwrap_or_default();
+        let (type_name, schema_encoding) = (of(|schema| &schema.name), of(|schema| &schema.encoding));
         let declared = Channel {
             topic,
             message_encoding,
-            type_name: of(|schema| &schema.name),
-            schema_encoding: of(|schema| &schema.encoding),
+            type_name: if schema_encoding == "ros1msg" { ros2_name(&type_name) } else { type_name },
+            schema_encoding,
             definition: of(|schema| &schema.text),
         };
         self.make_room(declared.bytes(), self.channels.get(&id).map_or(0, Channel::bytes))?;
@@ -426,7 +430,7 @@ mod tests {
     fn read(records: &[Vec<u8>], name: &str, limit_bytes: u64) -> Result<Vec<String>, RosBagError> {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join(name);
-        let bytes = [mcap::MAGIC, &records.concat()].concat();
+        let bytes = [MAGIC, &records.concat()].concat();
         let bytes = match name.ends_with("zstd") {
             true => ruzstd::encoding::compress_to_vec(&bytes[..], ruzstd::encoding::CompressionLevel::Fastest),
             false => bytes,

@@ -1,5 +1,4 @@
-//! The fields of an MCAP record, from its front. A length is believed once so many bytes are there; the crate
-//! `mcap` allocates what the length of a string says, up to 4 GiB, before it looks.
+//! The fields of an MCAP record, from its front. A length is believed once so many bytes are there.
 
 /// What is left of a record.
 pub(crate) struct Fields<'a>(pub(crate) &'a [u8]);

@@ -5,16 +5,13 @@
 //! ended. Every message is stamped in its header, and received when it is stamped. All poses are in one
 //! frame, the instrument's: dead reckoning starts where the instrument first saw the robot.
 
-use std::collections::BTreeMap;
-use std::io::{Seek, Write};
-
 use dataset::TruthSample;
 use kinematics::{Pose, Wheels, sin_cos, wrap_to_pi};
-use mcap::records::MessageHeader;
-use mcap::{McapError, WriteOptions, Writer};
 use serde::Serialize;
 
+use crate::error::RosBagError;
 use crate::known_types::KnownTypes;
+use crate::mcap_writer::McapWriter;
 use crate::messages::{self, BodyTwist, Header, IMU, JOINT_STATE, ODOMETRY, PATH, POSE_STAMPED, TF_MESSAGE};
 
 /// Stamp of the first row, seconds. A stamp of zero is none in ROS.
@@ -96,28 +93,26 @@ struct Waiting {
 }
 
 /// Writes runs as a bag.
-pub struct Recorder<W: Write + Seek> {
-    writer: Writer<W>,
+pub struct Recorder {
+    writer: McapWriter,
     topics: Vec<(u16, RecordedTopic)>,
     next_ns: i64,
 }
 
-impl<W: Write + Seek> Recorder<W> {
+impl Default for Recorder {
     /// A bag without messages.
-    ///
-    /// # Errors
-    /// Those of the writer.
-    pub fn new(writer: W) -> Result<Self, McapError> {
-        let library = concat!("yair ", env!("CARGO_PKG_VERSION"));
-        let options = WriteOptions::new().profile("ros2").library(library).compression(None);
-        Ok(Self { writer: options.create(writer)?, topics: Vec::new(), next_ns: FIRST_STAMP_S * 1_000_000_000 })
+    fn default() -> Self {
+        let writer = McapWriter::new("ros2", concat!("yair ", env!("CARGO_PKG_VERSION")));
+        Self { writer, topics: Vec::new(), next_ns: FIRST_STAMP_S * 1_000_000_000 }
     }
+}
 
+impl Recorder {
     /// Adds a run.
     ///
     /// # Errors
-    /// Those of the writer.
-    pub fn push(&mut self, run: &RecordedRun<'_>) -> Result<(), McapError> {
+    /// [`RosBagError::TooManyTopics`].
+    pub fn push(&mut self, run: &RecordedRun<'_>) -> Result<(), RosBagError> {
         let instants = || {
             let truth = run.truth.iter().map(|sample| sample.t_s);
             truth.chain(run.rows_s.iter().copied())
@@ -137,13 +132,7 @@ impl<W: Write + Seek> Recorder<W> {
         for Waiting { stamp_ns, channel, bytes } in &waiting {
             let (channel_id, topic) = &mut self.topics[*channel];
             let time = u64::try_from(*stamp_ns).unwrap_or_default();
-            let header = MessageHeader {
-                channel_id: *channel_id,
-                sequence: topic.messages as u32,
-                log_time: time,
-                publish_time: time,
-            };
-            self.writer.write_to_known_channel(&header, bytes)?;
+            self.writer.push(*channel_id, topic.messages as u32, time, bytes);
             topic.messages += 1;
         }
         let last_ns = waiting.last().map_or(begin_ns, |message| message.stamp_ns);
@@ -151,25 +140,23 @@ impl<W: Write + Seek> Recorder<W> {
         Ok(())
     }
 
-    /// Ends the bag: its topics.
-    ///
-    /// # Errors
-    /// Those of the writer.
-    pub fn finish(mut self) -> Result<Vec<RecordedTopic>, McapError> {
-        self.writer.finish()?;
-        Ok(self.topics.into_iter().map(|(_, topic)| topic).collect())
+    /// The bytes of the bag, and its topics.
+    #[must_use]
+    pub fn finish(self) -> (Vec<u8>, Vec<RecordedTopic>) {
+        (self.writer.finish(), self.topics.into_iter().map(|(_, topic)| topic).collect())
     }
 
     /// The place of a topic, which is made where it is new.
-    fn channel(&mut self, topic: &str, type_name: &'static str) -> Result<usize, McapError> {
+    fn channel(&mut self, topic: &str, type_name: &'static str) -> Result<usize, RosBagError> {
         if let Some(index) = self.topics.iter().position(|(_, known)| known.topic == topic) {
             return Ok(index);
         }
         let definition = KnownTypes::default().definition(type_name).unwrap_or_default();
-        let schema = self.writer.add_schema(type_name, "ros2msg", definition.as_bytes())?;
+        let schema = self.writer.add_schema(type_name, "ros2msg", &definition);
         // Recorders of ROS note the quality of service; none was asked for here.
-        let metadata = BTreeMap::from([("offered_qos_profiles".to_owned(), String::new())]);
-        let id = self.writer.add_channel(schema, topic, "cdr", &metadata)?;
+        let metadata = [("offered_qos_profiles", "")];
+        let id = schema.and_then(|schema| self.writer.add_channel(schema, topic, "cdr", &metadata));
+        let id = id.ok_or(RosBagError::TooManyTopics)?;
         self.topics.push((id, RecordedTopic { topic: topic.to_owned(), type_name, messages: 0 }));
         Ok(self.topics.len() - 1)
     }
@@ -180,7 +167,7 @@ impl<W: Write + Seek> Recorder<W> {
         truth: &[TruthSample],
         stamp_ns: impl Fn(f64) -> i64,
         waiting: &mut Vec<Waiting>,
-    ) -> Result<(), McapError> {
+    ) -> Result<(), RosBagError> {
         let has_heading = truth.iter().any(|sample| sample.theta_rad().is_some());
         let pose = |sample: &TruthSample| {
             let theta_rad = if has_heading { sample.theta_rad()? } else { 0.0 };
@@ -206,7 +193,7 @@ impl<W: Write + Seek> Recorder<W> {
         run: &RecordedRun<'_>,
         stamp_ns: impl Fn(f64) -> i64,
         waiting: &mut Vec<Waiting>,
-    ) -> Result<(), McapError> {
+    ) -> Result<(), RosBagError> {
         let Some(wheels) = &run.wheels else { return Ok(()) };
         let channel = self.channel("/joint_states", JOINT_STATE)?;
         let at = |both: &Wheels<Vec<f64>>, row: usize| Wheels { left: both.left[row], right: both.right[row] };
@@ -227,7 +214,7 @@ impl<W: Write + Seek> Recorder<W> {
         run: &RecordedRun<'_>,
         stamp_ns: impl Fn(f64) -> i64,
         waiting: &mut Vec<Waiting>,
-    ) -> Result<(), McapError> {
+    ) -> Result<(), RosBagError> {
         let Some(gyro) = &run.gyro else { return Ok(()) };
         let channel = self.channel("/imu", IMU)?;
         for (t_s, yaw_rate_rad_s) in &gyro.yaw_rates_rad_s {
@@ -244,7 +231,7 @@ impl<W: Write + Seek> Recorder<W> {
         path: &RecordedPath,
         stamp_ns: impl Fn(f64) -> i64,
         waiting: &mut Vec<Waiting>,
-    ) -> Result<(), McapError> {
+    ) -> Result<(), RosBagError> {
         let Some((first_s, _)) = path.poses.first() else { return Ok(()) };
         let odometry = self.channel(&format!("/odom/{}", path.name), ODOMETRY)?;
         let transforms = self.channel("/tf", TF_MESSAGE)?;
@@ -283,20 +270,19 @@ fn twist((from_s, from): (f64, Pose), (to_s, to): (f64, Pose)) -> BodyTwist {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::import::{FromBag, Options, import};
+    use crate::import::{FromBag, Options};
+    use crate::open_bag::import;
     use dataset::WheelLog;
     use dataset::import::csv::RobotGiven;
-    use std::io::Cursor;
 
     fn bag(runs: &[RecordedRun<'_>]) -> (Vec<RecordedTopic>, tempfile::TempDir) {
-        let mut bytes = Cursor::new(Vec::new());
-        let mut recorder = Recorder::new(&mut bytes).expect("a bag");
+        let mut recorder = Recorder::default();
         for run in runs {
             recorder.push(run).expect("written");
         }
-        let topics = recorder.finish().expect("written");
+        let (bytes, topics) = recorder.finish();
         let folder = tempfile::tempdir().expect("a folder");
-        std::fs::write(folder.path().join("a.mcap"), bytes.into_inner()).expect("written");
+        std::fs::write(folder.path().join("a.mcap"), bytes).expect("written");
         (topics, folder)
     }
 

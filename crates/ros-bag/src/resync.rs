@@ -4,8 +4,7 @@ use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
-use mcap::records::op;
-
+use crate::mcap_records::op;
 use crate::settings::MAX_CHUNK_BYTES;
 
 /// Bytes that are searched at a time.

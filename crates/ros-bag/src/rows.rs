@@ -1,16 +1,14 @@
 //! Rows of the two topics: one pass over the bag.
 
-use std::collections::BTreeMap;
-
 use crate::bag::Bag;
 use crate::cdr;
 use crate::clock::{self, Clock, Ordered, Times};
 use crate::definition::Definitions;
 use crate::error::RosBagError;
+use crate::frame_chain::Moved;
 use crate::gyro::{self, GyroReading};
 use crate::mcap_file::Channel;
-use crate::static_frames::{self, StaticFrames};
-use crate::topics::{TRANSFORMS, definitions};
+use crate::topics::definitions;
 use crate::truth::{TruthReader, TruthReading};
 use crate::value::Value;
 use crate::wheel_pair::{self, Resampling, WheelPair};
@@ -140,8 +138,6 @@ pub(crate) struct BothRows {
     /// None where walls are what was measured.
     pub(crate) truth: Option<Rows<TruthReading>>,
     pub(crate) gyro: Option<GyroRows>,
-    /// The transforms of `/tf_static`.
-    pub(crate) frames: StaticFrames,
     pub(crate) losses: Vec<String>,
 }
 
@@ -182,7 +178,7 @@ fn read_one(
 ) -> Result<BothRows, RosBagError> {
     let mut wheels: WheelRows = Rows::new(wheel_topic, "");
     let mut quantity = None;
-    let Visited { truth, gyro, frames, losses } = visit(bag, others, |channel, received_ns, message| {
+    let mut visited = visit(bag, others, |channel, received_ns, message| {
         if channel.topic == wheel_topic {
             wheels.type_name.clone_from(&channel.type_name);
             if let Some(value) = wheels.decode(channel, message)? {
@@ -199,15 +195,17 @@ fn read_one(
         Ok(())
     })?;
     wheels.refuse_none("both wheels")?;
+    visited.chain_poses(others, &wheels.times)?;
+    let Visited { truth, gyro, losses, .. } = visited;
     truth.as_ref().map_or(Ok(()), |truth| truth.refuse_none("a pose"))?;
     let quantity = quantity.unwrap_or(WheelQuantity::Angles);
-    Ok(BothRows { wheels, quantity, truth, gyro, frames, losses })
+    Ok(BothRows { wheels, quantity, truth, gyro, losses })
 }
 
 fn read_two(bag: &Bag, pair: &WheelPair, resampling: Resampling, others: Others<'_>) -> Result<BothRows, RosBagError> {
     let sides = [&pair.left, &pair.right];
     let mut rows: [Rows<f64>; 2] = sides.map(|side| Rows::new(&side.topic, &side.type_name));
-    let Visited { truth, gyro, frames, mut losses } = visit(bag, others, |channel, received_ns, message| {
+    let mut visited = visit(bag, others, |channel, received_ns, message| {
         for (side, rows) in sides.iter().zip(&mut rows) {
             if channel.topic != side.topic {
                 continue;
@@ -224,6 +222,8 @@ fn read_two(bag: &Bag, pair: &WheelPair, resampling: Resampling, others: Others<
         }
         Ok(())
     })?;
+    visited.chain_poses(others, &rows[0].times)?;
+    let Visited { truth, gyro, mut losses, .. } = visited;
     for rows in &rows {
         rows.refuse_none("the wheel's number")?;
         losses.extend(rows.warnings());
@@ -242,15 +242,33 @@ fn read_two(bag: &Bag, pair: &WheelPair, resampling: Resampling, others: Others<
     }
     let mut wheels: WheelRows = Rows::new(&pair.topics(), &left.type_name);
     (wheels.times, wheels.values) = (paired.times, paired.values);
-    Ok(BothRows { wheels, quantity: pair.quantity, truth, gyro, frames, losses })
+    Ok(BothRows { wheels, quantity: pair.quantity, truth, gyro, losses })
 }
 
 /// What is beside the wheels, and what was lost.
 struct Visited {
     truth: Option<Rows<TruthReading>>,
+    /// The transforms of a chain, of which the poses are still to be made.
+    moved: Option<Moved>,
     gyro: Option<GyroRows>,
-    frames: StaticFrames,
     losses: Vec<String>,
+}
+
+impl Visited {
+    /// Makes the poses of a chain of transforms, beside the wheels' times.
+    fn chain_poses(&mut self, others: Others<'_>, wheels: &[Times]) -> Result<(), RosBagError> {
+        let chain = others.truth.and_then(|(_, reader)| reader.chain());
+        let Some(((chain, moved), rows)) = chain.zip(self.moved.take()).zip(self.truth.as_mut()) else { return Ok(()) };
+        let (topic, type_name) = (rows.topic.clone(), rows.type_name.clone());
+        let (placed, note) =
+            chain.poses(&moved, wheels).map_err(|why| RosBagError::Unusable { topic, type_name, why })?;
+        for placed in &placed {
+            rows.push(placed.times, TruthReading::of_chain(placed), true);
+        }
+        rows.not_finite += moved.unreadable;
+        self.losses.extend(note.map(|note| format!("topic {}: {note}", rows.topic)));
+        Ok(())
+    }
 }
 
 /// One pass over the bag: poses and gyroscope, and every message to `wheels` too.
@@ -261,7 +279,7 @@ fn visit(
 ) -> Result<Visited, RosBagError> {
     let mut gyro = gyro.map(|topic| GyroRows { rows: Rows::new(topic, ""), frame: String::new() });
     let mut truth = truth.map(|(topic, reader)| (Rows::new(topic, ""), reader));
-    let (mut frames, mut of_frames) = (StaticFrames::default(), BTreeMap::new());
+    let mut moved = truth.as_ref().and_then(|(_, reader)| Some(reader.chain()?.moved()));
     let losses = bag.visit(|channel, received_ns, message| {
         wheels(channel, received_ns, message)?;
         if let Some(GyroRows { rows, frame }) = gyro.as_mut().filter(|gyro| gyro.rows.topic == channel.topic) {
@@ -279,16 +297,12 @@ fn visit(
                 }
             }
         }
-        if static_frames::is_static(&channel.topic) && channel.type_name == TRANSFORMS {
-            let rows: &mut Rows<()> = of_frames.entry(channel.topic.clone()).or_insert_with(|| Rows::new("", ""));
-            // A transform that cannot be read leaves the place of a sensor open.
-            if let Ok(Some(value)) = rows.decode(channel, message) {
-                frames.take(&value);
-            }
-        }
         if let Some((truth, truth_reader)) = truth.as_mut().filter(|(truth, _)| truth.topic == channel.topic) {
             truth.type_name.clone_from(&channel.type_name);
             if let Some(value) = truth.decode(channel, message)? {
+                if let Some((chain, moved)) = truth_reader.chain().zip(moved.as_mut()) {
+                    chain.take(&value, received_ns, moved);
+                }
                 match truth_reader.read(&value) {
                     Ok(readings) => {
                         for (stamped, reading) in readings {
@@ -302,5 +316,5 @@ fn visit(
         }
         Ok(())
     })?;
-    Ok(Visited { truth: truth.map(|(rows, _)| rows), gyro, frames, losses: losses.lines() })
+    Ok(Visited { truth: truth.map(|(rows, _)| rows), moved, gyro, losses: losses.lines() })
 }

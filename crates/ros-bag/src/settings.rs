@@ -25,11 +25,6 @@ pub(crate) const MIN_EXPANDED_BYTES: u64 = 1 << 30;
 /// Budgeted: some ten kilobytes a topic, of some thousand topics.
 pub(crate) const MAX_DECLARED_BYTES: usize = 64 << 20;
 
-/// Bytes. Shortest row of the messages in a file of SQLite, which has room for so many rows and no more.
-/// Derived: pointer to the cell 2; length and number of the row, head of the record and 3 columns 1 each.
-#[cfg(feature = "db3")]
-pub(crate) const MIN_SQLITE_ROW_BYTES: u64 = 8;
-
 /// Places of a file at which records no longer follow each other; what stands behind the last is left out.
 /// Budgeted: at each, the rest of the file may be read once more.
 pub(crate) const MAX_BREAKS: usize = 100;
@@ -45,6 +40,18 @@ pub(crate) const MAX_VALUES: usize = 1 << 20;
 /// Levels of types inside of types; a type that holds itself would go on for ever.
 /// Budgeted: standard messages reach 6.
 pub(crate) const MAX_DEPTH: usize = 32;
+
+/// Transforms in a chain of frames; a ring would go on for ever.
+/// Budgeted: an arm of ten joints on a mast on a base.
+pub(crate) const MAX_CHAIN: usize = 32;
+
+/// Seconds. Longest step between two transforms of the wheels' odometry in which a pose lies.
+/// Budgeted: five messages at 10 Hz, the slowest in use.
+pub(crate) const MAX_FRAME_GAP_S: f64 = 0.5;
+
+/// Smallest share of the wheels' stamps at which a transform that moves with them has its own.
+/// Budgeted: a tenth of the messages may be lost.
+pub(crate) const MIN_SHARED_STAMPS: f64 = 0.9;
 
 /// Types in one definition.
 /// Budgeted: the largest in use hold some dozens.

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use dataset::Quaternion;
 use kinematics::Pose;
 
-use crate::topics;
+use crate::settings::MAX_CHAIN;
+use crate::transform::{self, Rigid};
 use crate::value::Value;
 
 /// Frames of the robot, in the middle of whose wheels they are taken to be (REP 105).
@@ -15,54 +15,12 @@ const BASE_FRAMES: [&str; 2] = ["base_link", "base_footprint"];
 /// 1.5 % short.
 const MIN_UPRIGHT: f64 = 0.985;
 
-/// Longest chain of frames; a ring would go on for ever.
-const MAX_CHAIN: usize = 32;
-
 /// A lidar on the robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Mounted {
     pub(crate) body_from_lidar: Pose,
     /// Its z points down: its angles count clockwise as the robot sees them.
     pub(crate) is_upside_down: bool,
-}
-
-/// A rigid motion in space.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Rigid {
-    rotation: [[f64; 3]; 3],
-    translation: [f64; 3],
-}
-
-impl Rigid {
-    const IDENTITY: Self =
-        Self { rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], translation: [0.0; 3] };
-
-    /// Of a transform; none of a quaternion without direction.
-    fn of(transform: &Value) -> Option<Self> {
-        let number = |of: &str, axis: &str| transform.number(&format!("transform.{of}.{axis}"));
-        let mut translation = [0.0; 3];
-        for (value, axis) in translation.iter_mut().zip(["x", "y", "z"]) {
-            *value = number("translation", axis).filter(|value| value.is_finite())?;
-        }
-        let mut q = [0.0; 4];
-        for (value, axis) in q.iter_mut().zip(["x", "y", "z", "w"]) {
-            *value = number("rotation", axis)?;
-        }
-        let rotation = Quaternion::new(q)?.matrix();
-        Some(Self { rotation, translation })
-    }
-
-    /// This motion after `inner`.
-    fn after(&self, inner: &Self) -> Self {
-        let turned = |v: [f64; 3]| self.rotation.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2]);
-        let column = |k: usize| turned(inner.rotation.map(|row| row[k]));
-        let columns = [column(0), column(1), column(2)];
-        let moved = turned(inner.translation);
-        Self {
-            rotation: [0, 1, 2].map(|row| [0, 1, 2].map(|k| columns[k][row])),
-            translation: [0, 1, 2].map(|row| moved[row] + self.translation[row]),
-        }
-    }
 }
 
 /// Static transforms by their child.
@@ -76,11 +34,21 @@ pub(crate) fn is_static(topic: &str) -> bool {
     topic.rsplit('/').next() == Some("tf_static")
 }
 
+/// Is it a frame of the robot's base, under whatever name space?
+pub(crate) fn is_base(frame: &str) -> bool {
+    frame.rsplit('/').next().is_some_and(|name| BASE_FRAMES.contains(&name))
+}
+
 impl StaticFrames {
+    /// All of them: parent, child, and the motion from the one to the other.
+    pub(crate) fn all(&self) -> impl Iterator<Item = (&str, &str, &Rigid)> {
+        self.of.iter().map(|(child, (parent, rigid))| (&parent[..], &child[..], rigid))
+    }
+
     /// Takes the transforms of a message; of a child the last counts.
     pub(crate) fn take(&mut self, message: &Value) {
-        for transform in message.list("transforms") {
-            if let Some(((parent, child), rigid)) = topics::frames(transform).zip(Rigid::of(transform)) {
+        for stamped in message.list("transforms") {
+            if let Some(((parent, child), rigid)) = transform::frames(stamped).zip(Rigid::of(stamped)) {
                 self.of.insert(child.to_owned(), (parent.to_owned(), rigid));
             }
         }
@@ -105,16 +73,14 @@ impl StaticFrames {
 }
 
 fn plane(body_from_lidar: &Rigid) -> Result<Mounted, String> {
-    let Rigid { rotation, translation } = body_from_lidar;
-    let up = rotation[2][2];
+    let up = body_from_lidar.upright();
     if up.abs() < MIN_UPRIGHT {
         let tilt_deg = up.clamp(-1.0, 1.0).acos().to_degrees();
         return Err(format!(
             "its axis is tilted by {tilt_deg:.0}°: it does not see the plane that the robot drives in"
         ));
     }
-    let yaw_rad = rotation[1][0].atan2(rotation[0][0]);
-    Ok(Mounted { body_from_lidar: Pose::new(translation[0], translation[1], yaw_rad), is_upside_down: up < 0.0 })
+    Ok(Mounted { body_from_lidar: body_from_lidar.pose(), is_upside_down: up < 0.0 })
 }
 
 #[cfg(test)]

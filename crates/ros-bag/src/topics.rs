@@ -2,11 +2,15 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use kinematics::Wheels;
+
 use crate::bag::Bag;
 use crate::cdr;
-use crate::definition::Definitions;
+use crate::definition::{Definitions, Wire};
 use crate::error::RosBagError;
 use crate::mcap_file::Channel;
+use crate::static_frames::{self, StaticFrames};
+use crate::transform;
 use crate::value::Value;
 
 /// Messages of a topic of transforms or joints in which names are looked for; a publisher that has not named
@@ -27,6 +31,8 @@ pub(crate) struct Topic {
     pub(crate) frames: BTreeMap<(String, String), u64>,
     /// Paths of numbers in its first message, at most a dozen.
     pub(crate) numbers: Vec<String>,
+    /// The joints that are the wheels by the robot's own files, where it holds them.
+    pub(crate) known_wheels: Option<(String, String)>,
 }
 
 impl Topic {
@@ -36,14 +42,22 @@ impl Topic {
 }
 
 /// All topics, by name, and what was lost.
+#[derive(Default)]
 pub(crate) struct Survey {
     pub(crate) topics: BTreeMap<String, Topic>,
+    /// The transforms of `/tf_static`.
+    pub(crate) mounted: StaticFrames,
+    /// Topic and text of the robot's description.
+    pub(crate) description: Option<(String, String)>,
     pub(crate) losses: Vec<String>,
 }
 
 /// Types of joints: the list of their names.
 const JOINT_NAMES: [(&str, &str); 2] =
     [("sensor_msgs/msg/JointState", "name"), ("control_msgs/msg/DynamicJointState", "joint_names")];
+
+/// How the topic of a URDF ends, under whatever name space.
+const DESCRIPTION: &str = "robot_description";
 
 /// Transforms.
 pub(crate) const TRANSFORMS: &str = "tf2_msgs/msg/TFMessage";
@@ -52,6 +66,8 @@ impl Survey {
     pub(crate) fn of(bag: &Bag) -> Result<Self, RosBagError> {
         let mut topics: BTreeMap<String, Topic> = BTreeMap::new();
         let mut decoders: BTreeMap<String, Option<Definitions>> = BTreeMap::new();
+        let mut mounted = StaticFrames::default();
+        let mut description = None;
         let losses = bag.visit(|channel, log_time_ns, message| {
             if !topics.contains_key(&channel.topic) {
                 let topic = Topic {
@@ -76,7 +92,13 @@ impl Survey {
                 let decoder = decoders.get(&channel.topic).and_then(Option::as_ref);
                 if let Some(Ok(value)) = decoder.map(|definitions| cdr::decode(definitions, message)) {
                     note_names(topic, names, &value);
+                    if channel.type_name == TRANSFORMS && static_frames::is_static(&channel.topic) {
+                        mounted.take(&value);
+                    }
                     if is_first {
+                        if description.is_none() && channel.topic.ends_with(DESCRIPTION) {
+                            description = value.text("data").map(|text| (channel.topic.clone(), text.to_owned()));
+                        }
                         topic.numbers = value.paths_of_numbers();
                     }
                 }
@@ -87,7 +109,15 @@ impl Survey {
         if topics.is_empty() {
             return Err(RosBagError::NoMessages { file: bag.path.clone(), why: losses.join("; ") });
         }
-        Ok(Self { topics, losses })
+        Ok(Self { topics, mounted, description, losses })
+    }
+
+    /// Takes the joints of the wheels from the robot's own files, in topics that hold both.
+    pub(crate) fn know_wheels(&mut self, Wheels { left, right }: &Wheels<String>) {
+        let holds = |topic: &&mut Topic| topic.joints.contains(left) && topic.joints.contains(right);
+        for topic in self.topics.values_mut().filter(holds) {
+            topic.known_wheels = Some((left.clone(), right.clone()));
+        }
     }
 
     /// The topic of a flag.
@@ -103,17 +133,11 @@ fn note_names(topic: &mut Topic, names: Option<&str>, value: &Value) {
     if let Some(names) = names {
         topic.joints.extend(value.texts(names).into_iter().map(str::to_owned));
     }
-    for transform in value.list("transforms") {
-        if let Some((parent, child)) = frames(transform) {
+    for stamped in value.list("transforms") {
+        if let Some((parent, child)) = transform::frames(stamped) {
             *topic.frames.entry((parent.to_owned(), child.to_owned())).or_default() += 1;
         }
     }
-}
-
-/// Parent and child of a stamped transform, without the slash of older names.
-pub(crate) fn frames(transform: &Value) -> Option<(&str, &str)> {
-    let of = |path| transform.text(path).map(|frame| frame.trim_start_matches('/'));
-    Some((of("header.frame_id")?, of("child_frame_id")?))
 }
 
 /// How a channel's messages are read.
@@ -124,6 +148,11 @@ pub(crate) fn definitions(channel: &Channel) -> Result<Definitions, RosBagError>
     };
     match (&channel.message_encoding[..], &channel.schema_encoding[..]) {
         ("cdr", "ros2msg") => Definitions::parse(&channel.type_name, &channel.definition).map_err(refuse),
+        ("ros1", "ros1msg") if !channel.definition.trim().is_empty() => {
+            let parsed = Definitions::parse(&channel.type_name, &channel.definition).map_err(refuse)?;
+            Ok(Definitions { wire: Wire::Ros1, ..parsed })
+        }
+        ("ros1", "ros1msg") => Err(refuse("the bag does not define it; record it anew, or reindex the bag".to_owned())),
         (_, "ros2idl") => Err(refuse("it is defined in IDL (ros2idl), which is not read here".to_owned())),
         ("cdr", "") => {
             let why = "the bag does not define it; give its definition with --msg FILE, and those of the types inside";

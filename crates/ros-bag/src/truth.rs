@@ -3,7 +3,10 @@
 use dataset::{CovarianceScale, Dataset, PoseCovariance, Quaternion, TruthSigma};
 
 use crate::error::RosBagError;
-use crate::topics::{self, TRANSFORMS, Topic};
+use crate::frame_chain::{FrameChain, Placed};
+use crate::static_frames::StaticFrames;
+use crate::topics::{TRANSFORMS, Topic};
+use crate::transform;
 use crate::value::Value;
 
 /// Types that hold a pose: type, position, orientation, covariance.
@@ -26,10 +29,19 @@ pub(crate) const TRUTH_TYPES: [(&str, &str, &str, Option<&str>); 4] = [
 const COVARIANCE_PLACES: [usize; 6] = [0, 1, 5, 7, 11, 35];
 
 /// How poses are read from a topic's messages.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) enum TruthReader {
-    Pose { position: &'static str, orientation: &'static str, covariance: Option<&'static str> },
-    Transforms { parent: String, child: String },
+    Pose {
+        position: &'static str,
+        orientation: &'static str,
+        covariance: Option<&'static str>,
+    },
+    Transforms {
+        parent: String,
+        child: String,
+    },
+    /// Read once all of the bag is known.
+    Chain(FrameChain),
 }
 
 /// One pose in the plane.
@@ -47,7 +59,12 @@ pub(crate) struct TruthReading {
 }
 
 impl TruthReader {
-    pub(crate) fn new(topic: &Topic, frames: Option<&(String, String)>) -> Result<Self, RosBagError> {
+    /// `mounted` are the transforms of `/tf_static`.
+    pub(crate) fn new(
+        topic: &Topic,
+        frames: Option<&(String, String)>,
+        mounted: &StaticFrames,
+    ) -> Result<Self, RosBagError> {
         let refuse = |why: String| {
             let (topic, type_name) = (topic.name.clone(), topic.type_name.clone());
             RosBagError::Unusable { topic, type_name, why }
@@ -64,11 +81,11 @@ impl TruthReader {
             let slashless = |frame: &str| frame.trim_start_matches('/').to_owned();
             let (parent, child) = (slashless(parent), slashless(child));
             if !topic.frames.contains_key(&(parent.clone(), child.clone())) {
-                let why = format!(
-                    "no transform from {parent} directly to {child}; there are {}; transforms are not chained, since odometry is mostly among them",
-                    listed.join(" ")
-                );
-                return Err(refuse(why));
+                let chain = FrameChain::find((&parent, &child), &topic.frames, mounted);
+                let fixed: Vec<String> = mounted.all().map(|(parent, child, _)| format!("{parent},{child}")).collect();
+                let fixed = if fixed.is_empty() { "none".to_owned() } else { fixed.join(" ") };
+                let frames = || format!("there are {}, and by /tf_static {fixed}", listed.join(" "));
+                return chain.map(Self::Chain).map_err(|why| refuse(format!("{why}; {}", frames())));
             }
             return Ok(Self::Transforms { parent, child });
         }
@@ -88,14 +105,20 @@ impl TruthReader {
                 Ok(vec![(message, reading)])
             }
             Self::Transforms { parent, child } => {
-                let between = |transform: &&Value| topics::frames(transform) == Some((parent, child));
+                let between = |transform: &&Value| transform::frames(transform) == Some((parent, child));
                 let of = message.list("transforms").iter().filter(between);
                 of.map(|transform| {
                     Ok((transform, pose(transform, "transform.translation", "transform.rotation", None)?))
                 })
                 .collect()
             }
+            Self::Chain(_) => Ok(Vec::new()),
         }
+    }
+
+    /// The chain of transforms, where the poses are such.
+    pub(crate) const fn chain(&self) -> Option<&FrameChain> {
+        if let Self::Chain(chain) = self { Some(chain) } else { None }
     }
 
     /// What is read, for the user.
@@ -103,6 +126,22 @@ impl TruthReader {
         match self {
             Self::Pose { position, orientation, .. } => format!("{position} and {orientation}"),
             Self::Transforms { parent, child } => format!("{parent} to {child}"),
+            Self::Chain(chain) => chain.describe(),
+        }
+    }
+}
+
+impl TruthReading {
+    /// Of a chain of transforms, which state no precision.
+    pub(crate) const fn of_chain(placed: &Placed) -> Self {
+        let Placed { pose, tilt_rad, .. } = placed;
+        Self {
+            x_m: pose.x_m,
+            y_m: pose.y_m,
+            theta_rad: Some(pose.theta_rad),
+            tilt_rad: *tilt_rad,
+            precision: TruthSigma::UNKNOWN,
+            impossible: None,
         }
     }
 }
@@ -198,7 +237,8 @@ mod tests {
             Value::Message(vec![("pose".to_owned(), pose), ("covariance".to_owned(), Value::List(covariance))]);
         let message = Value::Message(vec![("pose".to_owned(), with_covariance)]);
         let type_name = "geometry_msgs/msg/PoseWithCovarianceStamped".to_owned();
-        let reader = TruthReader::new(&Topic { type_name, ..Topic::default() }, None).expect("a known type");
+        let reader = TruthReader::new(&Topic { type_name, ..Topic::default() }, None, &StaticFrames::default())
+            .expect("a known type");
         reader.read(&message).expect("a pose")[0].1
     }
 

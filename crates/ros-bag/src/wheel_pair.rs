@@ -153,7 +153,7 @@ pub(crate) fn pair(
     let [left_s, right_s] = [&left_series, &right_series].map(|series| median_step_s(series));
     if !(left_s / right_s <= MAX_RATE_RATIO && right_s / left_s <= MAX_RATE_RATIO) {
         return Err(refuse(format!(
-            "the left wheel has a message every {left_s:.4} s and the right one every {right_s:.4} s; a wheel in {MAX_RATE_RATIO} times as long steps cannot be put beside the other"
+            "the left wheel has a message every {left_s:.4} s and the right one every {right_s:.4} s; a wheel in {MAX_RATE_RATIO} times as long steps cannot be paired with the other"
         )));
     }
     let integral = Integral::of(&right_series, right_s);

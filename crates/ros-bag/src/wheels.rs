@@ -85,7 +85,7 @@ pub(crate) struct WheelReading {
     pub(crate) right: f64,
 }
 
-/// The joints of the two wheels, where their names tell.
+/// The joints of the two wheels, where the robot's own files or their names tell.
 pub(crate) fn wheel_joints(topic: &Topic) -> Option<(String, String)> {
     let side = |full: &str, letter: &str| {
         let of = |name: &&String| {
@@ -100,7 +100,8 @@ pub(crate) fn wheel_joints(topic: &Topic) -> Option<(String, String)> {
             _ => None,
         }
     };
-    Some((side("left", "l")?, side("right", "r")?)).filter(|(left, right)| left != right)
+    let by_names = || Some((side("left", "l")?, side("right", "r")?)).filter(|(left, right)| left != right);
+    topic.known_wheels.clone().or_else(by_names)
 }
 
 /// Is a topic's type one of joints?
@@ -201,7 +202,10 @@ impl WheelReader {
 
 #[cfg(test)]
 mod tests {
+    use kinematics::Wheels;
+
     use super::*;
+    use crate::topics::Survey;
 
     #[test]
     fn wheels_are_told_from_other_joints_by_their_names() {
@@ -215,6 +219,15 @@ mod tests {
         assert_eq!(of(&["wheel_l", "wheel_r", "castor"]), pair("wheel_l", "wheel_r"));
         assert_eq!(of(&["front_left_wheel", "rear_left_wheel", "front_right_wheel", "rear_right_wheel"]), None);
         assert_eq!(of(&["a", "b"]), None);
+        // The robot's own files come before names.
+        let mut survey = Survey::default();
+        for (name, joints) in [("/arm", ["left", "right"]), ("/base", ["m0", "m1"])] {
+            let joints = joints.map(str::to_owned).into();
+            survey.topics.insert(name.to_owned(), Topic { joints, ..Topic::default() });
+        }
+        survey.know_wheels(&Wheels { left: "m1".to_owned(), right: "m0".to_owned() });
+        assert_eq!(wheel_joints(&survey.topics["/base"]), pair("m1", "m0"));
+        assert_eq!(wheel_joints(&survey.topics["/arm"]), pair("left", "right"));
     }
 
     #[test]

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use crate::error::ScenarioError;
 use crate::experiment::Scenario;
+use crate::preset::expanded;
 
 /// Scenarios are written by hand; anything larger is another file.
 pub const LARGEST_FILE_BYTES: u64 = 1 << 20;
@@ -33,6 +34,11 @@ impl Scenario {
     /// # Errors
     /// As [`Self::read`].
     pub fn parse(text: &str, location: &str) -> Result<Self, ScenarioError> {
+        let no_toml = |message: String| ScenarioError::Toml { location: location.to_owned(), message };
+        if let Some(table) = expanded(text).map_err(no_toml)? {
+            let read = table.try_into::<Self>();
+            return read.map_err(|error| no_toml(error.message().trim().replace('\n', "; ")))?.checked(location);
+        }
         let scenario: Self = toml::from_str(text).map_err(|error| {
             let location = match error.span() {
                 Some(span) => format!("{location}:{}", text[..span.start].matches('\n').count() + 1),
@@ -40,6 +46,11 @@ impl Scenario {
             };
             ScenarioError::Toml { location, message: error.message().trim().replace('\n', "; ") }
         })?;
+        scenario.checked(location)
+    }
+
+    fn checked(self, location: &str) -> Result<Self, ScenarioError> {
+        let scenario = self;
         scenario.check(location)?;
         let no_fit =
             |source| ScenarioError::NoFit { location: location.to_owned(), key: "protocol".to_owned(), source };

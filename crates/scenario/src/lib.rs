@@ -2,7 +2,7 @@
 //! sweep. TOML in and out, no behaviour.
 //!
 //! A scenario is all that a simulated number depends on besides seed and trial. Unknown keys are errors, and
-//! no physical quantity has a default.
+//! no physical quantity has a default but by a `preset` that the scenario names.
 
 mod axis;
 mod budget;
@@ -12,6 +12,7 @@ mod experiment;
 mod file;
 mod limits;
 mod points;
+mod preset;
 mod programs;
 mod robot;
 mod shipped;

@@ -289,7 +289,7 @@ mod tests {
         assert!(with("protocol.straights.runs, ", "protocol.1.runs, ").contains("protocol.1.runs is set twice"));
         assert!(with("robot.wheel_separation_m\" = 0.5", "robot.wheel_separation_m\" = -1.0").contains("-1"));
         assert!(with("[sweep.case.set]", "[sweep.case.sets]").contains("`set`"));
-        assert!(with("\"robot.wheel_separation_m\"", "robot.wheel_separation_m").contains("stand in quotes"));
+        assert!(with("\"robot.wheel_separation_m\"", "robot.wheel_separation_m").contains("must be in quotes"));
         let twice = "[sweep.axes]\n\"effect.0.scale\" = [1.0]\n\"effect.wheel_scale.scale\" = [1.1]";
         assert!(refusal(twice).contains("effect.0.scale is set twice"));
     }

@@ -58,7 +58,7 @@ pub struct Case {
 /// meant.
 fn quoted_keys<'de, D: Deserializer<'de>>(set: D) -> Result<BTreeMap<String, f64>, D::Error> {
     #[derive(Deserialize)]
-    #[serde(untagged, expecting = "every value must be a number, and every dotted key stand in quotes")]
+    #[serde(untagged, expecting = "every value must be a number, and every dotted key must be in quotes")]
     enum Value {
         Number(f64),
     }

@@ -73,6 +73,8 @@ const CASES: &[Case] = &[
     case("sampling_skew", &[("right_delay_s", 0.01)], 0.06),
     case("truth_latency", &[("delay_s", 0.02)], 0.06),
     case("clock_rate", &[("rate", 1e-3)], 0.06),
+    // The ratio of the wheels' travels changes within the rows of a ramp.
+    case("turn_slip", &[("lost_share", 0.1)], 0.005),
     // The row in which a turn changes the castor's lean: 5 mm of a decay of 60 mm.
     fixed("castor_kick", ("decay_m", 0.06), &[("kick_rad", 0.02)], 0.08),
     // Fractions are drawn: 0.29 units of 20 µm a cycle and wheel, 5000 cycles, 0.363 m apart make 1.6e-3 rad

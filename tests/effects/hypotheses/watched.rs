@@ -129,7 +129,14 @@ pub(crate) fn missed(dataset: &Dataset, term: &mut dyn ModelTerm, values: &[f64]
         let sighted = |term: &mut dyn ModelTerm, t_s, world_from_body, twist| {
             let mut gradient = vec![Pose::IDENTITY; values.len()];
             term.measurement(
-                &Measurement { t_s, world_from_body, twist, record: &NoRecord, run: &run.info },
+                &Measurement {
+                    t_s,
+                    world_from_body,
+                    twist,
+                    twist_of_terms: Twist::default(),
+                    record: &NoRecord,
+                    run: &run.info,
+                },
                 &mut gradient,
             );
             sum(&gradient, values)

@@ -24,7 +24,7 @@ pub enum NoBound {
     #[error("a tachometer's wheel speeds are no pose measurement: leave the instrument out for a bound")]
     WheelSpeeds,
     /// Partial measurements beside poses have no bound here.
-    #[error("a gyro, a tape measure, walls or revisits beside whole poses have no closed bound here")]
+    #[error("a gyro, a tape measure, walls or revisits with whole poses have no closed bound here")]
     PartialMeasurements,
     /// Readings of a wall are of a lidar somewhere on the robot.
     #[error(

@@ -163,8 +163,7 @@ mod tests {
         let matrix = root.transpose() * root;
         let inverse = matrix.try_inverse().expect("regular");
         let information = information(matrix);
-        let parameters = [Parameter::LeftWheelDiameter, Parameter::RightWheelDiameter, Parameter::WheelSeparation];
-        for (row, parameter) in parameters.into_iter().enumerate() {
+        for (row, parameter) in Parameter::LENGTHS.into_iter().enumerate() {
             let var = information.bound_var(parameter).expect("seen");
             // The condition of the matrix, about 1e2, times the rounding of a double.
             assert!((var / inverse[(row, row)] - 1.0).abs() < 1e-12, "{parameter:?}");

@@ -46,24 +46,20 @@ impl FolderLock {
         std::fs::create_dir_all(folder).map_err(unwritable)?;
         for _ in 0..MAX_TURNS {
             let file = opened(&path).map_err(unwritable)?;
-            match file.try_lock() {
-                Ok(()) if !is_still_at(&file, &path) => {}
-                Ok(()) => {
-                    let why_not_held = keeps_others_out(&path).err().map(|error| error.to_string());
-                    return Ok(Self::held(file, path, why_not_held));
-                }
-                Err(TryLockError::WouldBlock) => return Err(in_use()),
-                Err(TryLockError::Error(error)) => {
-                    return Ok(Self::held(file, path, Some(error.to_string())));
-                }
+            let locked = file.try_lock();
+            if matches!(locked, Err(TryLockError::WouldBlock)) {
+                return Err(in_use());
             }
+            // First, so that a signal from now on takes the file away.
+            let _under_way = UnderWay::of(&path);
+            let why_not_held = match locked {
+                Err(error) => Some(error.to_string()),
+                Ok(()) if !is_still_at(&file, &path) => continue,
+                Ok(()) => keeps_others_out(&path).err().map(|error| error.to_string()),
+            };
+            return Ok(Self { file: Some(file), path, why_not_held, _under_way });
         }
         Err(in_use())
-    }
-
-    fn held(file: File, path: PathBuf, why_not_held: Option<String>) -> Self {
-        let _under_way = UnderWay::of(&path);
-        Self { file: Some(file), path, why_not_held, _under_way }
     }
 
     /// Why the lock keeps nobody out, where it does not: some network file systems know no locks.

@@ -21,6 +21,7 @@ pub use accuracy::{AccuracyCheck, Comparison, FALSE_ALARM_BUDGET, compare, read_
 pub use campaign::{Campaign, Outcome, Progress};
 pub use lock::FolderLock;
 pub use merge::{Merged, merge};
+pub use page::figure;
 pub use plan::{MAX_TRIALS, SweepOptions, SweepPlan, TRACKED};
 pub use result::{Coverage, DriftResult, EstimatorResult, MethodCost, PointResult, Quantile, SweepResult};
 pub use state::Shard;

@@ -89,8 +89,8 @@ fn percent((value, error): (f64, f64), truth: f64) -> (f64, f64) {
     (100.0 * value / truth, 100.0 * error / truth)
 }
 
-/// The page of a sweep; `None` when there is no axis with two levels.
-pub(super) fn page(result: &SweepResult) -> Option<Figure> {
+/// The picture of a sweep; `None` when there is no axis with two levels.
+pub fn figure(result: &SweepResult) -> Option<Figure> {
     let mut caption = format!("Scenario {}, seed {}", result.scenario, result.seed);
     match result.precision {
         Some(precision) => caption.push_str(&format!(", Monte-Carlo errors of at most {} %.", 100.0 * precision)),

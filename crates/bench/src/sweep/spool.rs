@@ -33,9 +33,8 @@ impl Spool {
             let length = file.metadata()?.len();
             if length < keep {
                 // Filled up it would hold estimates of 0 that no method gave.
-                let why = format!(
-                    "it has {length} bytes and the state beside it counts {keep}; delete the folder and sweep anew"
-                );
+                let why =
+                    format!("it has {length} bytes and its state file counts {keep}; delete the folder and sweep anew");
                 return Err(std::io::Error::other(why));
             }
             if keep > 0 {
@@ -83,6 +82,6 @@ mod tests {
         drop(Spool::open(folder.path(), written - 16).expect("cut back"));
         assert_eq!(std::fs::metadata(spool_in(folder.path())).expect("there").len(), written - 16);
         let refused = Spool::open(folder.path(), written).err().expect("shorter than its state says").to_string();
-        assert!(refused.contains("it has 32 bytes and the state beside it counts 48"), "{refused}");
+        assert!(refused.contains("it has 32 bytes and its state file counts 48"), "{refused}");
     }
 }

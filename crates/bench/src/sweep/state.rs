@@ -189,7 +189,7 @@ impl State {
     fn why_not_of(&self, plan: &SweepPlan) -> Option<&'static str> {
         let shard = Shard::new(self.shard.number, self.shard.of);
         let Some(begun) = shard.and_then(|shard| Self::new(plan, shard, self.rows()).ok()) else {
-            return Some("its shard is none");
+            return Some("its shard does not exist");
         };
         let Self { first, next, end, .. } = *self;
         if (first, end) != (begun.first, begun.end) || first > next || next > end || next.chunk > plan.chunks() {

@@ -49,7 +49,7 @@ fn write_all(plan: &SweepPlan, result: &SweepResult, spools: &[PathBuf], dir: &P
     if !spools.is_empty() {
         write_rows(plan, result, spools, dir)?;
     }
-    if let Some(page) = super::page::page(result) {
+    if let Some(page) = super::page::figure(result) {
         page.write(dir, "sweep")?;
     }
     Ok(())

@@ -203,7 +203,7 @@ impl Method for Circular {
             not_observable: vec![NotObservable {
                 parameter: Parameter::CommonScale,
                 why: "a factor common to both wheels changes how far round a circle goes, not its radius; \
-                      the nominal mean diameter is kept, and the wheelbase is right all the same: measure a straight run of known length",
+                      the nominal mean diameter is kept, and the wheelbase is right all the same: measure a straight run of known length".into(),
             }],
             runs_used: runs.len(),
             runs_rejected,

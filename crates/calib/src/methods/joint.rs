@@ -11,6 +11,8 @@
 //! Reference: Schweppe 1965; Ljung & Box 1978 (whiteness); Liang & Zeger 1986 (sandwich over runs); Varin,
 //! Reid & Firth 2011 (composite likelihood).
 
+use std::collections::BTreeSet;
+
 use dataset::{Blocks, DatasetError, Session, Warning};
 use estimation::{
     Column, FitSettings, Grouping, LargeFit, Model, ModelFit, NoiseComponent, OneStepError, PartialOutliers, Records,
@@ -19,13 +21,18 @@ use estimation::{
 use kinematics::Pose;
 use motion_programs::Schedule;
 use nalgebra::{Matrix3, Vector3};
+use preflight::Driven;
 
-use crate::dead_reckoning_jacobian::unobservable;
+use crate::dead_reckoning_jacobian::{HARDLY_TURN, ON_THE_SPOT, WHEEL_HARDLY_TURNS, unobservable};
 use crate::estimate::{
     CalibError, Calibration, Covariance, Extrinsics, GroupInstrument, Method, NotObservable, OdometryNoise, Parameter,
     Rejected, drive, geometry_covariance, nominal,
 };
-use crate::settings::{MIN_COMMON_SCALE_COMPONENT, MIN_NAMED_COMPONENT, STATED_LENGTH_SIGMA};
+use crate::settings::{
+    MAX_OTHER_WAY, MAX_UNREMARKED_RATIO, MIN_COMMON_SCALE_COMPONENT, MIN_DISTANCE_M, MIN_MOVED_SIGMAS,
+    MIN_NAMED_COMPONENT, MIN_TURNING_RAD, STATED_LENGTH_SIGMA,
+};
+use crate::turn_loss;
 
 /// The method with the settings of its fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,6 +73,39 @@ impl Joint {
 const BENDS_ALIKE: &str =
     "the runs bend alike, so that wheels and separation make up for each other: add straights, and turns both ways";
 
+/// Puts what was driven in the place of a reason that was not the cause: a drive that has enough of what a
+/// parameter needs leaves it open because wheels and instrument do not go together.
+fn state_facts(found: &mut Calibration, driven: &Driven) {
+    let Driven { left_rad, right_rad, distance_m, straight_m, .. } = *driven;
+    let noise = found.noise;
+    for blind in &mut found.not_observable {
+        let is_cause = match &*blind.why {
+            // On straights both wheels turn.
+            WHEEL_HARDLY_TURNS => straight_m < MIN_DISTANCE_M,
+            HARDLY_TURN => left_rad + right_rad < MIN_TURNING_RAD,
+            ON_THE_SPOT => distance_m < MIN_DISTANCE_M,
+            BENDS_ALIKE => left_rad.min(right_rad) < MAX_OTHER_WAY * (left_rad + right_rad),
+            _ => true,
+        };
+        if !is_cause && driven.is_followed {
+            let apart = noise.map_or_else(String::new, |noise| {
+                format!(
+                    ": they differ as if wheels erred by {:.1} mm/√m and turns by {:.1} °/√rad",
+                    1e3 * noise.wheel_sigma_m_per_sqrt_m,
+                    noise.turn_sigma_rad_per_sqrt_rad.to_degrees()
+                )
+            });
+            let one_way = left_rad.min(right_rad) < MAX_OTHER_WAY * (left_rad + right_rad);
+            let both = if one_way { "; add turns the other way round" } else { "" };
+            blind.why = format!(
+                "the runs {}{both}; what the instrument saw does not follow the wheels closely enough{apart}",
+                driven.sentence()
+            )
+            .into();
+        }
+    }
+}
+
 /// Why the instrument's heading on the robot is not determined.
 const NO_HEADINGS: &str = "no heading was measured: positions are the same however the instrument is turned";
 
@@ -103,7 +143,11 @@ impl Method for Joint {
         let (robot, _) = nominal(Self::NAME, sessions)?;
         let names: Vec<&str> = sessions.iter().map(|session| session.name).collect();
         let fit = self.settings.fit(sessions).map_err(|error| CalibError::of_fit(Self::NAME, error))?;
-        calibration(&fit, robot.ticks_per_rev, &names)
+        let mut found = calibration(&fit, robot.ticks_per_rev, &names)?;
+        if !found.not_observable.is_empty() {
+            state_facts(&mut found, &Driven::of(sessions));
+        }
+        Ok(found)
     }
 }
 
@@ -147,12 +191,15 @@ fn calibration(fit: &ModelFit<'_>, ticks_per_rev: Option<f64>, names: &[&str]) -
     let latency_sigma_s = fit.position(Column::Latency).and_then(|row| var(row, row)).map(f64::sqrt);
     let mut drive = calibrated_drive(fit, covariance.as_ref(), ticks_per_rev)?;
     if extrinsics.is_some() && !fit.has(Column::SensorTheta) {
-        drive.not_observable.push(NotObservable { parameter: Parameter::SensorTheta, why: NO_HEADINGS });
+        drive.not_observable.push(NotObservable { parameter: Parameter::SensorTheta, why: NO_HEADINGS.into() });
     }
+    let skids = fit.solution.model.separation_m > MAX_UNREMARKED_RATIO * fit.nominal.separation_m;
+    let turn_loss = skids.then(|| turn_loss::sentence(fit)).flatten();
     Ok(Calibration {
         extrinsics,
-        latency_s: fit.has(Column::Latency).then_some((instrument.latency_s, latency_sigma_s)),
+        latency_s: fit.has(Column::Latency).then_some((mean_clock_s(fit) + instrument.latency_s, latency_sigma_s)),
         group_instruments: group_instruments(fit, names),
+        seen: moved(fit, names).into_iter().chain(turn_loss).collect(),
         runs_rejected: rejected(fit),
         ..drive
     })
@@ -172,6 +219,7 @@ fn noise(fit: &ModelFit<'_>) -> OdometryNoise {
 /// of, and wheels that change by more than their standard deviation where a separation that is not determined
 /// is off by as much as stated lengths are.
 fn not_observable(fit: &ModelFit<'_>, covariance: Option<&Covariance>) -> Vec<NotObservable> {
+    let mut said = BTreeSet::new();
     fit.unobservable
         .iter()
         .flat_map(|direction| {
@@ -195,8 +243,9 @@ fn not_observable(fit: &ModelFit<'_>, covariance: Option<&Covariance>) -> Vec<No
             } else {
                 (vec![parameter], why)
             };
-            named.into_iter().map(move |parameter| NotObservable { parameter, why })
+            named.into_iter().map(move |parameter| NotObservable { parameter, why: why.into() })
         })
+        .filter(|blind| said.insert(blind.parameter.key()))
         .collect()
 }
 
@@ -244,9 +293,68 @@ fn rejected(fit: &ModelFit<'_>) -> Vec<Rejected> {
     unused.chain(far).chain(partial).collect()
 }
 
+/// What was taken off the stamps before the fit, in the mean of the sessions, seconds.
+fn mean_clock_s(fit: &ModelFit<'_>) -> f64 {
+    fit.records.clock_s.iter().sum::<f64>() / fit.records.clock_s.len().max(1) as f64
+}
+
+/// What differs for certain between the instruments of the first session and another. Clocks that were taken
+/// off the stamps before the fit are apart by more than any doubt.
+fn moved(fit: &ModelFit<'_>, names: &[&str]) -> Vec<String> {
+    let clock_s = |session: usize| fit.records.clock_s.get(session).copied().unwrap_or(0.0);
+    let sentence = |[first, other]: [usize; 2], what: &str| {
+        let names = format!("{} and {}", names[first], names[other]);
+        format!("between {names} the instrument {what}: it was mounted anew, or its clock set")
+    };
+    let later = |by_s: f64| {
+        let (ms, way) = (1e3 * by_s.abs(), if by_s > 0.0 { "later" } else { "earlier" });
+        format!("became {ms:.0} ms {way}")
+    };
+    let Some(own) = &fit.solution.model.own else {
+        let apart = (1..names.len()).map(|other| (other, clock_s(other) - clock_s(0))).filter(|(_, by_s)| *by_s != 0.0);
+        return apart.map(|(other, by_s)| sentence([0, other], &later(by_s))).collect();
+    };
+    // Of runs that have instruments for themselves, where each is a session.
+    let sessions: BTreeSet<usize> = own.of.keys().map(|group| group.0).collect();
+    if sessions.len() < own.of.len() {
+        return Vec::new();
+    }
+    let Some((first, before)) = own.of.first_key_value() else { return Vec::new() };
+    let mut sentences = Vec::new();
+    for (group, instrument) in own.of.iter().skip(1) {
+        let clocks_s = clock_s(group.0) - clock_s(first.0);
+        let mut say = |column: Column, by: f64, what: String| {
+            let sigmas = [first, group].map(|group| fit.own_sigma(*group, column));
+            let is_by_fit = matches!(sigmas, [Some(a), Some(b)] if by.abs() > MIN_MOVED_SIGMAS * a.hypot(b));
+            if is_by_fit || (column == Column::Latency && clocks_s != 0.0) {
+                sentences.push(sentence([first.0, group.0], &what));
+            }
+        };
+        let [a, b] = [before, instrument].map(|of| of.body_from_sensor);
+        let turned_rad = kinematics::wrap_to_pi(b.theta_rad - a.theta_rad);
+        let (x_m, y_m) = (b.x_m - a.x_m, b.y_m - a.y_m);
+        let late_s = clocks_s + instrument.latency_s - before.latency_s;
+        say(Column::SensorTheta, turned_rad, format!("turned by {:.2}°", turned_rad.to_degrees()));
+        say(Column::SensorX, x_m, format!("moved by {:.1} mm ahead", 1e3 * x_m));
+        say(Column::SensorY, y_m, format!("moved by {:.1} mm to the left", 1e3 * y_m));
+        say(Column::Latency, late_s, later(late_s));
+    }
+    sentences
+}
+
 /// The instruments of groups, by the sessions' names.
 fn group_instruments(fit: &ModelFit<'_>, names: &[&str]) -> Vec<GroupInstrument> {
-    let Some(own) = &fit.solution.model.own else { return Vec::new() };
+    let clock_s = &fit.records.clock_s;
+    let Some(own) = &fit.solution.model.own else {
+        // Clocks that were apart before the fit.
+        let are_apart = clock_s.iter().any(|clock_s_of| *clock_s_of != clock_s[0]);
+        let latency_s = fit.solution.model.latency_s;
+        let of = |(name, clock_s): (&&str, &f64)| GroupInstrument {
+            latency_s: Some(clock_s + latency_s),
+            ..GroupInstrument::new(name)
+        };
+        return names.iter().zip(clock_s).filter(|_| are_apart).map(of).collect();
+    };
     let name = |(session, run): (usize, usize)| {
         let session_name = names[session].to_owned();
         match own.grouping {
@@ -265,7 +373,7 @@ fn group_instruments(fit: &ModelFit<'_>, names: &[&str]) -> Vec<GroupInstrument>
                 sensor_x_m: shown(Column::SensorX, x_m),
                 sensor_y_m: shown(Column::SensorY, y_m),
                 sensor_theta_rad: shown(Column::SensorTheta, theta_rad),
-                latency_s: shown(Column::Latency, instrument.latency_s),
+                latency_s: shown(Column::Latency, clock_s.get(group.0).unwrap_or(&0.0) + instrument.latency_s),
             }
         })
         .collect()

@@ -105,7 +105,8 @@ impl Method for JungChung {
             not_observable: vec![NotObservable {
                 parameter: Parameter::CommonScale,
                 why: "a heading is a ratio of lengths: wheels and wheelbase larger by one factor turn alike; \
-                      the nominal mean diameter is kept: measure a straight run of known length first",
+                      the nominal mean diameter is kept: measure a straight run of known length first"
+                    .into(),
             }],
             runs_used: cw.count + ccw.count,
             ..Calibration::new(Self::NAME, drive(Self::NAME, diameter_m, separation_m)?, robot.ticks_per_rev)

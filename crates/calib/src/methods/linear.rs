@@ -357,7 +357,7 @@ impl Linear {
             let of = |covariance: DMatrix<f64>| &jacobian * covariance * jacobian.transpose();
             let blind = NotObservable {
                 parameter: Parameter::CommonScale,
-                why: "the runs end where they began, and headings are ratios of lengths; the nominal mean diameter is kept: add straight runs",
+                why: "the runs end where they began, and headings are ratios of lengths; the nominal mean diameter is kept: add straight runs".into(),
             };
             (base_m, scatter_between_runs(&normal, &scores, 2).map(of), vec![blind])
         };

@@ -285,6 +285,20 @@ mod tests {
         PathErrors { paths, nominal: NOMINAL.into(), heading_m: 0.5, factors: Vector3::repeat(1.0) }
     }
 
+    /// By the true robot only headings err, by 0.1 rad; of a weight of 0.25 m they count as 25 mm.
+    #[test]
+    fn a_heading_counts_by_its_weight() {
+        let mut paths = runs(2, 2.0, 5.0, 0.0);
+        paths.iter_mut().flat_map(|path| &mut path.later).for_each(|of| of.pose.theta_rad += 0.1);
+        let errors = PathErrors { nominal: TRUTH.into(), heading_m: 0.25, ..errors(&paths) };
+        let mut ends = 0;
+        errors.for_each_end(|_, error, _| {
+            ends += 1;
+            assert!((error - Vector3::new(0.0, 0.0, -0.025)).norm() < 1e-12, "{error}");
+        });
+        assert_eq!(ends, 12);
+    }
+
     fn found(paths: &[PoseMeasurements<'_>]) -> Vector3<f64> {
         let (errors, report) = LevenbergMarquardt::new().minimize(errors(paths));
         assert!(report.termination.was_successful(), "{report:?}");

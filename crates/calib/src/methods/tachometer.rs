@@ -120,7 +120,7 @@ impl Method for Tachometer {
             covariance,
             not_observable: vec![NotObservable {
                 parameter: Parameter::WheelSeparation,
-                why: "the speeds of the wheels do not say how far apart they are; the nominal value is kept: add spins for direct or ivanjko",
+                why: "the speeds of the wheels do not say how far apart they are; the nominal value is kept: add spins for direct or ivanjko".into(),
             }],
             runs_used: values.len(),
             runs_rejected,

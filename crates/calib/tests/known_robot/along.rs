@@ -53,7 +53,7 @@ fn robot(smaller_by: f64) -> NamedCalibration {
         ("sensor_y_m", BODY_FROM_SENSOR.y_m),
         ("sensor_theta_rad", BODY_FROM_SENSOR.theta_rad),
     ];
-    NamedCalibration { name: "x".to_owned(), values: values.map(|(key, value)| (key.to_owned(), value)).into() }
+    NamedCalibration::new("x".to_owned(), values.map(|(key, value)| (key.to_owned(), value)).into())
 }
 
 fn paths(dataset: &Dataset, calibration: &AugmentedCalibration) -> Vec<RunPath> {

@@ -3,7 +3,8 @@
 //! Equations of one run are tested in each method's own file; here the whole way from records to estimates
 //! is.
 
-use calib::{Calibration, METHODS, Parameter};
+use calib::{Calibration, Covariance, METHODS, Parameter};
+use dataset::{Protocol, Run, TruthSample};
 
 use crate::log::{DIAMETER_M, Log, NOMINAL_SEPARATION_M, SEPARATION_M};
 
@@ -78,4 +79,54 @@ fn every_method_says_what_it_is_and_what_to_drive_for_it() {
     }
     let abouts: std::collections::BTreeSet<_> = METHODS.iter().map(|method| method.about()).collect();
     assert_eq!(abouts.len(), METHODS.len(), "two methods say the same of themselves");
+}
+
+/// The covariance by a method of a log whose last poses of one run are off by so much.
+fn covariance_with(name: &str, off: impl Fn(&mut Vec<Run>)) -> Covariance {
+    let mut dataset = Log::exact().dataset();
+    off(&mut dataset.runs);
+    let found = calib::method(name).expect("known").calibrate(&[dataset.session()]).expect("a calibration");
+    found.covariance.expect("a covariance")
+}
+
+/// Ends where the instrument says it does not.
+fn end_off(run: &mut Run, x_m: f64, turn_rad: f64) {
+    let last = run.truth.last_mut().expect("poses");
+    *last = TruthSample::new(last.t_s, last.x_m + x_m, last.y_m, last.theta_rad().map(|rad| rad + turn_rad));
+}
+
+/// The wheelbase is by the half sum of both directions' errors and the wheels are by the half difference.
+/// Where clockwise squares alone scatter, both are of one error; where both scatter alike, of two.
+#[test]
+fn wheels_and_base_err_together_where_squares_of_one_direction_do() {
+    let correlation = |name: &str, directions: &[Protocol]| {
+        let covariance = covariance_with(name, |runs| {
+            for direction in directions {
+                let mut of = runs.iter_mut().filter(|run| run.info.protocol == Some(*direction));
+                end_off(of.next().expect("two squares"), 0.02, 0.02);
+            }
+        });
+        (covariance[(1, 2)] / (covariance[(1, 1)] * covariance[(2, 2)]).sqrt()).abs()
+    };
+    for name in ["umbmark", "jung_chung"] {
+        // Others err by 10⁻⁵, a two-thousandth.
+        assert!(correlation(name, &[Protocol::SquareCw]) > 0.999, "{name}");
+        let both = correlation(name, &[Protocol::SquareCw, Protocol::SquareCcw]);
+        assert!(both < 0.2, "{name}: {both}");
+    }
+}
+
+/// A spin of a turn that is off by δ has a base that is off by δ/2π of it. Of the two of its direction the
+/// mean is off by a half of that, ± as much, and the mean of both directions by a quarter.
+#[test]
+fn the_base_of_ivanjko_is_the_mean_of_both_directions() {
+    let turn_rad = 0.02;
+    let covariance = covariance_with("ivanjko", |runs| {
+        let spin = runs.iter_mut().find(|run| run.info.protocol == Some(Protocol::Spin)).expect("a spin");
+        end_off(spin, 0.0, turn_rad);
+    });
+    let expected_m = 0.25 * turn_rad / std::f64::consts::TAU * SEPARATION_M;
+    // The true turn is a hundredth less than a nominal one; the radii and the other spins err by 10⁻⁵, a
+    // hundredth of what is asked for.
+    assert!((covariance[(2, 2)].sqrt() / expected_m - 1.0).abs() < 0.03, "{covariance} {expected_m}");
 }

@@ -81,7 +81,7 @@ pub(super) fn open(source: &Path) -> Result<Vec<Source>, DatasetError> {
         let t0_s = t_s;
         t_s += interval_s;
         if t_s <= t0_s {
-            return Err(foreign(format!("T = {interval_s:e} s is lost beside the {t0_s:e} s before")));
+            return Err(foreign(format!("T = {interval_s:e} s is lost against the {t0_s:e} s before")));
         }
         times_s.push(t_s);
         ticks.left.push(total.left);

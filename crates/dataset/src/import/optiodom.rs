@@ -8,18 +8,16 @@
 //! What a run drove is not written anywhere but in folder names; it is read off the wheels (see [`label`]).
 
 use std::collections::BTreeMap;
-use std::f64::consts::{PI, TAU};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use kinematics::{DriveGeometry, Increment, Wheels};
+use kinematics::Wheels;
 
 use crate::error::{DatasetError, shown};
 use crate::imported::Source;
-use crate::record::{
-    Dataset, NominalRobot, Odometry, Protocol, ProtocolSettings, Provenance, Run, RunInfo, TruthNoise, TruthSample,
-    WheelLog,
-};
+use crate::protocols::label;
+use crate::record::{Dataset, NominalRobot, Odometry, Provenance, Run, RunInfo, TruthNoise, TruthSample, WheelLog};
+use crate::run_motion::RunMotion;
 use crate::table::{Table, read_lines};
 
 const EXPECTED_FOLDER: &str = "a folder that holds SESSION_metadata.csv and SESSION_run-NN.csv, at any depth";
@@ -208,136 +206,13 @@ fn read_run(id: &str, file: &Path, metadata: &Metadata) -> Result<Run, DatasetEr
         return Err(DatasetError::EmptyFile { file: file.to_owned(), expected: EXPECTED_RUN.to_owned() });
     }
     let mut info = RunInfo { id: id.to_owned(), ..RunInfo::default() };
-    // Positive lengths were checked as the metadata was read.
-    if let (Ok(geometry), Some(ticks_per_rev)) = (metadata.robot.geometry(), metadata.robot.ticks_per_rev)
-        && let Some(motion) = Motion::of(&ticks, &geometry, ticks_per_rev)
-    {
+    let odometry = Odometry { t_s: times_s.into(), wheels: WheelLog::Ticks(ticks), ..Odometry::default() };
+    if let Some(motion) = RunMotion::of(&odometry, &metadata.robot) {
         let (protocol, settings) = label(&motion, metadata.side_m);
         info.protocol = Some(protocol);
         info.settings = settings;
     }
-    let odometry = Odometry { t_s: times_s.into(), wheels: WheelLog::Ticks(ticks), ..Odometry::default() };
     Ok(Run { info, odometry, truth, ..Run::default() })
-}
-
-/// How a run moved as a whole, by its nominal geometry.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-struct Motion {
-    /// Signed path of the centre, metres.
-    distance_m: f64,
-    /// Net turn, radians.
-    turn_rad: f64,
-    /// Length of the path, forward and backward, metres.
-    path_m: f64,
-    /// From the smallest heading to the largest, radians.
-    heading_range_rad: f64,
-    /// How far the heading departs from one that grows evenly with the distance, radians.
-    uneven_rad: f64,
-    /// Sum of the turns' sizes, radians.
-    turning_rad: f64,
-    /// The part of it during which the wheels went in opposite directions, radians.
-    on_the_spot_rad: f64,
-}
-
-impl Motion {
-    fn of(ticks: &Wheels<Vec<i64>>, geometry: &DriveGeometry, ticks_per_rev: f64) -> Option<Self> {
-        let m_per_count = geometry.m_per_count(ticks_per_rev).ok()?;
-        let mut motion = Self::default();
-        let mut course = Vec::with_capacity(ticks.left.len());
-        for (left, right) in ticks.left.windows(2).zip(ticks.right.windows(2)) {
-            let counts = Wheels { left: left[1].wrapping_sub(left[0]), right: right[1].wrapping_sub(right[0]) };
-            let Increment { distance_m, turn_rad } =
-                geometry.increment(counts.zip_with(m_per_count, |counts, m_per_count| counts as f64 * m_per_count));
-            motion.distance_m += distance_m;
-            motion.turn_rad += turn_rad;
-            motion.turning_rad += turn_rad.abs();
-            motion.path_m += distance_m.abs();
-            course.push((motion.distance_m, motion.turn_rad));
-            if counts.left.signum() * counts.right.signum() < 0 {
-                motion.on_the_spot_rad += turn_rad.abs();
-            }
-        }
-        let (mut lowest_rad, mut highest_rad) = (0.0_f64, 0.0_f64);
-        let rad_per_m = motion.turn_rad / motion.distance_m;
-        for (distance_m, turn_rad) in course {
-            (lowest_rad, highest_rad) = (lowest_rad.min(turn_rad), highest_rad.max(turn_rad));
-            motion.uneven_rad = motion.uneven_rad.max((turn_rad - rad_per_m * distance_m).abs());
-        }
-        motion.heading_range_rad = highest_rad - lowest_rad;
-        Some(motion)
-    }
-}
-
-/// What a run drove: a label only where all of the run is like it, else `free`.
-///
-/// | label | rule (by the nominal robot) | setting |
-/// | --- | --- | --- |
-/// | `spin` | a path of less than 0.1 m, and a net turn of at least an eighth of a turn | `turn_rad`: the nearest whole number of half turns |
-/// | `straight` | at least 0.1 m, and all headings within 10° | `length_m`: signed, to the centimetre |
-/// | `square_*` | a whole turn to within an eighth, most of the turning with the wheels in opposite directions, four sides where the metadata says their length | `side_m`: the metadata's |
-/// | `circle_*` | at least a half turn, with both wheels forward, that grows evenly with the distance | `radius_m`: distance over turn, the mean radius of the run, to the millimetre |
-/// | `free` | none of these | |
-///
-/// All but `free` go one way: forward or backward, left or right. The runs of the study's `circular` folder
-/// are spirals: half turns of a radius that shrinks from 0.375 m. Their mean is what one number can say.
-fn label(motion: &Motion, side_m: Option<f64>) -> (Protocol, ProtocolSettings) {
-    const MOVES_M: f64 = 0.1;
-    const EIGHTH_RAD: f64 = TAU / 8.0;
-    /// The study's straights keep within 4°.
-    const STRAIGHT_RAD: f64 = TAU / 36.0;
-    /// What of a path or of the headings may go the other way: the study's squares have 2 %.
-    const ONE_WAY: f64 = 0.95;
-    /// The study's spirals are uneven by 0.043 to 0.068 of their turn; a drive of two different arcs by more.
-    const UNEVEN: f64 = 0.1;
-    /// The study's circles turn for 3 % with wheels in opposite directions, as they start and stop.
-    const ON_THE_SPOT: f64 = 0.1;
-    /// The study's squares are 1 % short by the nominal robot.
-    const SIDES: f64 = 0.1;
-    let none = ProtocolSettings::default();
-    let free = (Protocol::Free, none);
-    // Counts that are no robot's give lengths that are none.
-    let is_path = motion.path_m.is_finite() && motion.distance_m.is_finite() && motion.turn_rad.is_finite();
-    if !is_path {
-        return free;
-    }
-    let turn_rad = motion.turn_rad.abs();
-    let turns_one_way = turn_rad >= ONE_WAY * motion.heading_range_rad;
-    let clockwise = motion.turn_rad < 0.0;
-    if motion.path_m < MOVES_M {
-        if turn_rad < EIGHTH_RAD || !turns_one_way {
-            return free;
-        }
-        let turn_rad = (motion.turn_rad / PI).round() * PI;
-        return (Protocol::Spin, ProtocolSettings { turn_rad: Some(turn_rad), ..none });
-    }
-    if motion.distance_m.abs() < ONE_WAY * motion.path_m {
-        return free;
-    }
-    if motion.heading_range_rad < STRAIGHT_RAD {
-        let length_m = (motion.distance_m * 100.0).round() / 100.0;
-        return (Protocol::Straight, ProtocolSettings { length_m: Some(length_m), ..none });
-    }
-    let sides = side_m.is_none_or(|side_m| (motion.distance_m.abs() / (4.0 * side_m) - 1.0).abs() < SIDES);
-    let is_square = (turn_rad - TAU).abs() < EIGHTH_RAD && motion.on_the_spot_rad > 0.5 * motion.turning_rad && sides;
-    let is_circle = turn_rad >= 4.0 * EIGHTH_RAD
-        && motion.on_the_spot_rad < ON_THE_SPOT * motion.turning_rad
-        && motion.uneven_rad < UNEVEN * turn_rad;
-    match (turns_one_way, is_square, is_circle) {
-        (true, true, _) => {
-            let protocol = if clockwise { Protocol::SquareCw } else { Protocol::SquareCcw };
-            (protocol, ProtocolSettings { side_m, ..none })
-        }
-        (true, false, true) => {
-            let radius_m = (motion.distance_m / motion.turn_rad).abs();
-            let radius_m = (radius_m * 1000.0).round() / 1000.0;
-            if !(radius_m.is_finite() && radius_m > 0.0) {
-                return free;
-            }
-            let protocol = if clockwise { Protocol::CircleCw } else { Protocol::CircleCcw };
-            (protocol, ProtocolSettings { radius_m: Some(radius_m), ..none })
-        }
-        _ => free,
-    }
 }
 
 #[cfg(test)]
@@ -407,62 +282,5 @@ mod tests {
         let temp = tempfile::tempdir().expect("a temporary folder");
         assert!(matches!(read(temp.path()), Err(DatasetError::NothingToImport { .. })));
         assert!(matches!(read(&temp.path().join("absent")), Err(DatasetError::NotAFolder { .. })));
-    }
-
-    #[test]
-    fn labels_follow_the_rule_on_both_sides_of_its_borders() {
-        let motion = |distance_m: f64, turn_rad: f64, on_the_spot_rad| Motion {
-            distance_m,
-            path_m: distance_m.abs() + 0.02,
-            turn_rad,
-            heading_range_rad: turn_rad.abs(),
-            uneven_rad: 0.05 * turn_rad.abs(),
-            turning_rad: turn_rad.abs() + 0.1,
-            on_the_spot_rad,
-        };
-        let labelled = |motion| label(&motion, Some(0.75));
-        assert_eq!(labelled(motion(-1.502, 0.02, 0.0)).1.length_m, Some(-1.5));
-        assert_eq!(labelled(motion(0.007, -3.19, 3.1)).1.turn_rad, Some(-PI));
-        assert_eq!(
-            labelled(motion(2.98, 6.3, 5.0)),
-            (Protocol::SquareCcw, ProtocolSettings { side_m: Some(0.75), ..Default::default() })
-        );
-        assert_eq!(labelled(motion(2.98, -6.3, 5.0)).0, Protocol::SquareCw);
-        assert_eq!(
-            labelled(motion(3.98, -12.57, 0.4)),
-            (Protocol::CircleCw, ProtocolSettings { radius_m: Some(0.317), ..Default::default() })
-        );
-        assert_eq!(labelled(motion(2.98, 6.3, 0.4)).0, Protocol::CircleCcw);
-        // Not a square of these sides, not a whole turn, too short a turn, hardly any motion.
-        for (distance_m, turn_rad, on_the_spot_rad) in
-            [(4.0, 6.3, 5.0), (2.0, 3.0, 2.9), (2.0, 1.0, 0.0), (0.01, 0.1, 0.1)]
-        {
-            assert_eq!(labelled(motion(distance_m, turn_rad, on_the_spot_rad)).0, Protocol::Free, "{distance_m}");
-        }
-    }
-
-    #[test]
-    fn drives_of_several_kinds_are_free() {
-        let geometry = DriveGeometry::new(Wheels::both(0.1), 0.2).expect("a drive");
-        // Rows of wheel counts, 100 a turn, in pieces of so many rows.
-        let drive = |pieces: &[(i64, i64, usize)]| {
-            let mut ticks = Wheels { left: vec![0], right: vec![0] };
-            for &(left, right, rows) in pieces {
-                for _ in 0..rows {
-                    ticks.left.push(ticks.left[ticks.left.len() - 1] + left);
-                    ticks.right.push(ticks.right[ticks.right.len() - 1] + right);
-                }
-            }
-            label(&Motion::of(&ticks, &geometry, 100.0).expect("motion"), None).0
-        };
-        assert_eq!(drive(&[(10, 10, 50)]), Protocol::Straight);
-        assert_eq!(drive(&[(5, 10, 100)]), Protocol::CircleCcw);
-        assert_eq!(drive(&[(-5, 5, 20)]), Protocol::Spin);
-        // A slalom whose net turn is nothing, out and back, two arcs, a circle and a straight, to and fro.
-        assert_eq!(drive(&[(5, 10, 60), (10, 5, 120), (5, 10, 60)]), Protocol::Free);
-        assert_eq!(drive(&[(10, 10, 50), (-10, -10, 30)]), Protocol::Free);
-        assert_eq!(drive(&[(5, 10, 100), (8, 10, 100)]), Protocol::Free);
-        assert_eq!(drive(&[(5, 10, 100), (10, 10, 100)]), Protocol::Free);
-        assert_eq!(drive(&[(-5, 5, 20), (5, -5, 10)]), Protocol::Free);
     }
 }

@@ -183,11 +183,11 @@ impl Table {
         if let [only] = &names[..]
             && let Some((_, delimiter)) = others.into_iter().find(|(delimiter, _)| only.contains(*delimiter))
         {
-            return format!("; {delimiter} stand between the fields where commas are expected: {import} reads it");
+            return format!("; {delimiter} separate the fields where commas are expected: {import} reads it");
         }
         let mapping = likely_mapping(names);
         if column == "theta_rad" && mapping.iter().all(|(quantity, _)| *quantity != Quantity::Heading) {
-            return "; where no heading was seen the column stands there and is empty".to_owned();
+            return "; where no heading was measured, leave the column empty".to_owned();
         }
         let likely: Vec<String> = mapping
             .into_iter()

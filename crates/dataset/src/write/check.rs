@@ -119,7 +119,7 @@ fn check_run(dataset: &Dataset, first: Discriminant<WheelLog>, run: &Run) -> Che
             sigma("sigma_theta_rad", one.sigma_theta_rad)?;
             if let Some(covariance) = one.covariance {
                 PoseCovariance::stated(covariance.elements())
-                    .map_err(|why| format!("a covariance of truth that is none: {why}"))?;
+                    .map_err(|why| format!("an invalid covariance of truth: {why}"))?;
             }
         }
     }

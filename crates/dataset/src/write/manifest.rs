@@ -27,6 +27,8 @@ struct ManifestOut<'a> {
     gyro: GyroOut,
     #[serde(skip_serializing_if = "Option::is_none")]
     lidar: Option<LidarOut>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    corrections: Option<CorrectionsOut>,
     run: Vec<RunOut<'a>>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     point: Vec<PointOut<'a>>,
@@ -87,6 +89,11 @@ impl GyroOut {
 }
 
 #[derive(Serialize)]
+struct CorrectionsOut {
+    truth_shift_s: f64,
+}
+
+#[derive(Serialize)]
 struct LidarOut {
     #[serde(skip_serializing_if = "Option::is_none")]
     yaw_rad: Option<f64>,
@@ -125,7 +132,11 @@ struct PointOut<'a> {
 }
 
 /// `dataset.toml` of a dataset that has been checked, whose runs are these.
-pub(crate) fn to_toml(dataset: &Dataset, runs: &[RunInfo]) -> Result<String, toml::ser::Error> {
+pub(crate) fn to_toml(
+    dataset: &Dataset,
+    runs: &[RunInfo],
+    truth_shift_s: Option<f64>,
+) -> Result<String, toml::ser::Error> {
     let Provenance { name, licence, source, notes, robot_id, recorded } = &dataset.provenance;
     toml::to_string(&ManifestOut {
         format: FORMAT,
@@ -145,6 +156,7 @@ pub(crate) fn to_toml(dataset: &Dataset, runs: &[RunInfo]) -> Result<String, tom
         },
         gyro: GyroOut::of(dataset.truth_noise.gyro),
         lidar: dataset.truth_noise.lidar.map(|lidar| LidarOut { yaw_rad: lidar.yaw_rad }),
+        corrections: truth_shift_s.map(|truth_shift_s| CorrectionsOut { truth_shift_s }),
         run: runs.iter().map(RunOut::new).collect(),
         point: dataset
             .points

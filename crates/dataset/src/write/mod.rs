@@ -45,10 +45,28 @@ pub enum Existing {
 /// [`DatasetError::NotWritable`] when the dataset could not be read back (a NaN, unequal columns, a run
 /// without truth …); [`DatasetError::Io`]. In each case `dir` is as it was.
 pub fn write(dataset: &Dataset, dir: &Path, existing: Existing) -> Result<(), DatasetError> {
+    write_with_shift(dataset, dir, existing, None)
+}
+
+/// Writes a dataset whose instrument's instants are shifted as it is read: `truth_shift_s` seconds are added
+/// to them by `[corrections]`, and the tables keep what was recorded.
+///
+/// # Errors
+/// As [`write()`]; [`DatasetError::NotWritable`] of a shift that is no number.
+pub fn write_with_shift(
+    dataset: &Dataset,
+    dir: &Path,
+    existing: Existing,
+    truth_shift_s: Option<f64>,
+) -> Result<(), DatasetError> {
     // Before anything is made.
     check::check(dataset)?;
+    if let Some(shift_s) = truth_shift_s.filter(|shift_s| !shift_s.is_finite()) {
+        return Err(DatasetError::NotWritable { what: format!("a shift of {shift_s} s") });
+    }
     let header = dataset.header();
     let mut writer = Writer::with_columns(header, OptionalColumns::of(&dataset.runs), dir, existing)?;
+    writer.truth_shift_s = truth_shift_s;
     dataset.runs.iter().try_for_each(|run| writer.push(run))?;
     writer.finish()
 }
@@ -67,6 +85,8 @@ pub fn check_writable(dataset: &Dataset) -> Result<(), DatasetError> {
 pub struct Writer {
     /// Without runs.
     header: Dataset,
+    /// `[corrections] truth_shift_s`.
+    truth_shift_s: Option<f64>,
     columns: OptionalColumns,
     target: PathBuf,
     existing: Existing,
@@ -107,7 +127,7 @@ impl Writer {
         // The name of the folder under way would tell the user nothing: only the kind of the error is shown.
         let work = WorkFolder::beside(parent).map_err(|source| io_error(&target, io::Error::from(source.kind())))?;
         let (infos, ids, tables) = (Vec::new(), BTreeSet::new(), Default::default());
-        Ok(Self { header, columns, target, existing, work, infos, ids, form: None, tables })
+        Ok(Self { header, truth_shift_s: None, columns, target, existing, work, infos, ids, form: None, tables })
     }
 
     /// Adds a run.
@@ -150,7 +170,8 @@ impl Writer {
         if self.infos.is_empty() {
             return Err(check::without_runs());
         }
-        let toml = manifest::to_toml(&self.header, &self.infos).map_err(|error| not_writable(error.to_string()))?;
+        let toml = manifest::to_toml(&self.header, &self.infos, self.truth_shift_s)
+            .map_err(|error| not_writable(error.to_string()))?;
         if toml.len() as u64 > MANIFEST_LIMIT_BYTES {
             let what = format!(
                 "{MANIFEST} would be longer than {MANIFEST_LIMIT_BYTES} bytes; write fewer runs in one dataset"

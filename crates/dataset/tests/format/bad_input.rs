@@ -214,11 +214,7 @@ fn missing_and_wrong_columns() {
         "run,t_s,l,r\n",
         "odometry.csv:1: missing column left_ticks,right_ticks or left_rad,right_rad or left_mps,right_mps or v_mps,omega_radps; the columns",
     );
-    fault(
-        "odometry.csv",
-        ODOMETRY.replace("right_t", "left_t"),
-        "odometry.csv:1: column left_ticks stands there twice",
-    );
+    fault("odometry.csv", ODOMETRY.replace("right_t", "left_t"), "odometry.csv:1: column left_ticks occurs twice");
     fault(
         "truth.csv",
         TRUTH.replace("theta_rad", "theta_deg"),
@@ -409,8 +405,8 @@ fn hints(file: &str, content: impl AsRef<[u8]>, expected: &str) {
 
 #[test]
 fn what_was_likely_meant_is_said() {
-    hints("odometry.csv", ODOMETRY.replace(',', ";"), "semicolons stand between the fields where commas are expected");
-    hints("odometry.csv", ODOMETRY.replace(',', "\t"), "tabs stand between the fields");
+    hints("odometry.csv", ODOMETRY.replace(',', ";"), "semicolons separate the fields where commas are expected");
+    hints("odometry.csv", ODOMETRY.replace(',', "\t"), "tabs separate the fields");
     hints("odometry.csv", ODOMETRY.replace("0.1", "0,1"), "5 fields; expected 4 as in the header; decimal commas?");
     hints("odometry.csv", ODOMETRY.replace("0.1", "\"0,1\""), "with a decimal point and no comma");
     hints(
@@ -419,7 +415,7 @@ fn what_was_likely_meant_is_said() {
         "; likely run=run, t=t_s, left=enc_l, right=enc_r: yair import csv",
     );
     hints("truth.csv", TRUTH.replace(",theta_rad", ",heading"), "likely run=run, t=t_s, x=x_m, y=y_m, theta=heading");
-    hints("truth.csv", "run,t_s,x_m,y_m\na,0,0,0\n", "the column stands there and is empty");
+    hints("truth.csv", "run,t_s,x_m,y_m\na,0,0,0\n", "leave the column empty");
     let cut = &TOML[..TOML.find("_m = 0.3").expect("a key")];
     hints("dataset.toml", cut, "dataset.toml:5: the file may be cut off at line 5");
     hints(

@@ -94,7 +94,7 @@ fn covariances_of_rows_are_read_and_impossible_ones_named() {
     for (row, why) in [
         ("a,0,0,0,0,1e-4,2e-4,0,1e-4,0,1e-4", "not positive definite"),
         ("a,0,0,0,0,-1,0,0,1,0,1", "a variance is negative"),
-        ("a,0,0,0,0,1,0,0.5,1,0,0", "beside a variance of zero"),
+        ("a,0,0,0,0,1,0,0.5,1,0,0", "with a variance of zero"),
     ] {
         let found = message(row);
         assert!(found.contains("truth.csv:2: cov_xx to cov_tt are no covariance") && found.contains(why), "{found}");

@@ -266,7 +266,7 @@ fn datasets() -> impl Strategy<Value = Dataset> {
             )| {
                 let mut ids = std::collections::BTreeSet::new();
                 runs.retain(|run| ids.insert(run.info.id.clone()));
-                Dataset {
+                let mut dataset = Dataset {
                     provenance: Provenance { name, licence, source, notes, robot_id, recorded },
                     robot: NominalRobot {
                         left_wheel_diameter_m: left,
@@ -278,7 +278,10 @@ fn datasets() -> impl Strategy<Value = Dataset> {
                     truth_noise: TruthNoise { sigma_xy_m: noise.0, sigma_theta_rad: noise.1, ..TruthNoise::default() },
                     points: points.clone(),
                     runs,
-                }
+                };
+                // As a reader does: two runs that begin at the same counts are angles that go on.
+                dataset.carry_wheel_angles();
+                dataset
             },
         )
     })

@@ -182,8 +182,8 @@ fn doubts_are_said_in_their_order() {
         (Doubt::Incomplete, "does not explain all that is there"),
         (Doubt::OtherForm(Covariate::RunTime), "its size changes with time in run, which it should not"),
         (Doubt::ScattersAlike, "other effects that differ from turn to turn scatter alike"),
-        (Doubt::OtherGeometry, "beside a geometry that is not the described robot's"),
-        (Doubt::DoesNotCarryOver, "it does not carry over: "),
+        (Doubt::OtherGeometry, "with a geometry that is not the described robot's"),
+        (Doubt::DoesNotCarryOver, "it does not hold elsewhere: "),
     ];
     for (doubt, words) in all {
         assert!(said(Basis::Mean, &[SLIP, Cause::Unknown], &[doubt]).contains(words), "{words}");
@@ -257,6 +257,6 @@ fn a_part_of_a_large_log_is_said_with_its_faults() {
     assert!(said.contains("(60 of 600 rows, 50 of 500 measurements)"), "{said}");
     let fault = document::RowFault { id: "torn_read".to_owned(), stretches: 7, diagnosed_stretches: 2 };
     let said = subsample(&part(vec![fault.clone(), fault]));
-    let one = "torn_read in 7 stretches, of which 2 were diagnosed";
+    let one = "torn_read in 7 stretches, 2 of them diagnosed";
     assert!(said.ends_with(&format!("in all rows: {one}; {one}")), "{said}");
 }

@@ -13,7 +13,7 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::{Benchmark, ParameterLaw};
-use crate::description::{Description, Summary};
+use crate::description::{Description, Statement, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
@@ -70,9 +70,9 @@ impl PhysicalEffect for Backlash {
 
     fn description() -> Description {
         Description {
-            summary: Summary::WithValues(|values| {
+            summary: Summary::WithSize(|values| {
                 let [left, right] = ["left_gap_m", "right_gap_m"].map(|name| values.shown(name, 1e3, "mm"));
-                format!("{MEANING}: {left} on the left, {right} on the right")
+                Statement::of(MEANING, format!("{left} on the left, {right} on the right"))
             }),
             benchmark: Benchmark {
                 // No width is held: the gaps themselves are the sizes.

@@ -12,14 +12,14 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::Benchmark;
-use crate::description::{Description, Summary};
+use crate::description::{Description, Statement, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
 use crate::on_board::OnBoard;
 
 /// What it is, in one line.
-const MEANING: &str = "the castor resists rolling aside";
+const MEANING: &str = "the castor resists rolling sideways";
 
 /// The mean term in C, for a robot's own odometry.
 const ON_BOARD: &str = "\
@@ -60,9 +60,9 @@ impl PhysicalEffect for CastorDrag {
 
     fn description() -> Description {
         Description {
-            summary: Summary::WithValues(|values| {
+            summary: Summary::WithSize(|values| {
                 let lost = values.shown("drag_rad_m", 1e3, "mrad");
-                format!("{MEANING}: {lost} of turn lost for each metre that it rolls so")
+                Statement::of(MEANING, format!("{lost} of turn lost for each metre rolled sideways"))
             }),
             benchmark: Benchmark::of_mean_at(|_, _, stream| vec![("castor_behind_m", stream.uniform_in(0.1, 0.4))]),
             on_board: OnBoard::Static(ON_BOARD),

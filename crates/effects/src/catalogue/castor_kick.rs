@@ -15,7 +15,7 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::Benchmark;
-use crate::description::{Description, Summary};
+use crate::description::{Description, Statement, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
@@ -87,7 +87,9 @@ impl PhysicalEffect for CastorKick {
 
     fn description() -> Description {
         Description {
-            summary: Summary::WithValues(|values| format!("{MEANING} by {}", values.shown("kick_rad", 1e3, "mrad"))),
+            summary: Summary::WithSize(|values| {
+                Statement::of(MEANING, format!("by {}", values.shown("kick_rad", 1e3, "mrad")))
+            }),
             benchmark: Benchmark::of_mean_at(|_, _, stream| vec![("decay_m", stream.log_uniform(0.02, 0.2))])
                 .with_form("a castor by its differential equation, which turns the robot as it flips", |values, _| {
                     let of = |name| value_of(values, name).unwrap_or(0.0);

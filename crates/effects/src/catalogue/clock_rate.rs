@@ -14,7 +14,7 @@ use kinematics::{Pose, Twist};
 use model_term::{Interval, Measurement, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
-use crate::description::{Description, Excitation, Summary};
+use crate::description::{Description, Excitation, Statement, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, SampleClock};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
@@ -22,7 +22,7 @@ use crate::on_board::OnBoard;
 use crate::time_shift::TimeShift;
 
 /// What it is, in one line.
-const MEANING: &str = "one clock runs fast";
+const MEANING: &str = "the robot's clock runs fast";
 
 /// Rate of the robot's clock.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -50,8 +50,11 @@ impl PhysicalEffect for ClockRate {
 
     fn description() -> Description {
         Description {
-            summary: Summary::WithValues(|values| format!("{MEANING}, by {}", values.shown("rate", 100.0, "%"))),
-            excitation: Excitation::Conditions("log speeds beside an instrument with a clock of its own"),
+            summary: Summary::WithSize(|values| {
+                let what = values.by_sign("rate", MEANING, "the robot's clock runs slow");
+                Statement::of(what, format!("by {}", values.magnitude("rate", 100.0, "%")))
+            }),
+            excitation: Excitation::Conditions("log speeds together with an instrument that has its own clock"),
             is_clock_rate: true,
             on_board: OnBoard::Never(
                 "a pose by counts has no clock in it, and speeds are by the clock of the log that was fitted",
@@ -142,6 +145,7 @@ mod tests {
             t_s: 2.0,
             world_from_body: Pose::IDENTITY,
             twist: Twist { v_m_s: 0.5, omega_rad_s: 0.1 },
+            twist_of_terms: Twist::default(),
             record: &NoRecord,
             run: &run,
         };

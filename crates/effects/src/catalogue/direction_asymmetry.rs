@@ -10,14 +10,14 @@ use kinematics::{Pose, Wheels};
 use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
-use crate::description::{Description, Summary};
+use crate::description::{Description, Statement, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
 use crate::on_board::OnBoard;
 
 /// What it is, in one line.
-const MEANING: &str = "forward and backward metres count differently";
+const MEANING: &str = "a count is another distance forward than backward";
 
 /// The mean term in C, for a robot's own odometry.
 const ON_BOARD: &str = "\
@@ -54,9 +54,16 @@ impl PhysicalEffect for DirectionAsymmetry {
 
     fn description() -> Description {
         Description {
-            summary: Summary::WithValues(|values| {
-                let [left, right] = ["left_asymmetry", "right_asymmetry"].map(|name| values.shown(name, 100.0, "%"));
-                format!("{MEANING}: by {left} on the left wheel, {right} on the right")
+            summary: Summary::WithSize(|values| {
+                let shown = |name| values.magnitude(name, 100.0, "%");
+                let word = |name| values.by_sign(name, "farther", "less far");
+                let (left, right) = ("left_asymmetry", "right_asymmetry");
+                let size = if word(left) == word(right) {
+                    format!("{} left, {} right, {} forward", shown(left), shown(right), word(left))
+                } else {
+                    format!("{} {} left, {} {} right, forward", shown(left), word(left), shown(right), word(right))
+                };
+                Statement::of(MEANING, size)
             }),
             on_board: OnBoard::Static(ON_BOARD),
             ..Description::of(MEANING)

@@ -12,7 +12,7 @@ use kinematics::{Pose, Side, Wheels};
 use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
-use crate::description::{Description, Summary};
+use crate::description::{Description, Statement, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, LastAngle, Variant, value_of};
@@ -92,13 +92,13 @@ impl PhysicalEffect for EncoderCycle {
 
     fn description() -> Description {
         Description {
-            summary: Summary::WithValues(|values| {
+            summary: Summary::WithSize(|values| {
                 let cycles = values.value("cycles").map_or_else(|| "some".to_owned(), |cycles| format!("{cycles:.0}"));
                 let off = values.amplitudes("_rad", 1e3, "mrad", "encoder is off");
-                format!("an encoder errs {cycles} times a turn: {off}")
+                Statement::of("an encoder errs periodically within a turn", format!("{cycles} times a turn, {off}"))
             }),
             on_board: ON_BOARD,
-            ..Description::of("an encoder errs several times a turn")
+            ..Description::of("an encoder errs periodically within a turn")
         }
     }
 

@@ -14,7 +14,7 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::{Benchmark, FloorForm, contact_twist};
-use crate::description::{Description, Summary};
+use crate::description::{Description, Statement, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
@@ -50,8 +50,10 @@ impl PhysicalEffect for LateralSkid {
 
     fn description() -> Description {
         Description {
-            summary: Summary::WithValues(|values| {
-                format!("{MEANING}, by {} times speed times yaw rate", values.shown("skid_s", 1e3, "ms"))
+            summary: Summary::WithSize(|values| {
+                let what = values.by_sign("skid_s", MEANING, "the robot slides inwards in bends");
+                let skid = values.magnitude("skid_s", 1e3, "mm/s");
+                Statement::of(what, format!("{skid} for each m/s² of centripetal acceleration"))
             }),
             // Pacejka 2012: the side force of a tyre saturates with its slip angle.
             benchmark: Benchmark::OF_MEAN.with_form(

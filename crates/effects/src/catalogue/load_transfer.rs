@@ -11,7 +11,7 @@ use kinematics::{Increment, Pose, Wheels};
 use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
-use crate::description::{Description, Summary};
+use crate::description::{Description, Statement, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
@@ -48,9 +48,10 @@ impl PhysicalEffect for LoadTransfer {
 
     fn description() -> Description {
         Description {
-            summary: Summary::WithValues(|values| {
-                let differ = values.shown("compression_s2_m", 100.0, "%");
-                format!("{MEANING}: radii differ by {differ} for each m/s² of side acceleration, each way")
+            summary: Summary::WithSize(|values| {
+                let what = values.by_sign("compression_s2_m", MEANING, "in bends the inner tyre is pressed flatter");
+                let differ = values.magnitude("compression_s2_m", 100.0, "%");
+                Statement::of(what, format!("radii differ by {differ} for each m/s² of side acceleration"))
             }),
             on_board: OnBoard::Static(ON_BOARD),
             ..Description::of(MEANING)

@@ -16,7 +16,7 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::Benchmark;
-use crate::description::{Description, Summary};
+use crate::description::{Description, Statement, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout, Step};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
@@ -61,8 +61,8 @@ impl PhysicalEffect for LowSpeedTruncation {
 
     fn description() -> Description {
         Description {
-            summary: Summary::WithValues(|values| {
-                format!("{MEANING}: {} of speed lost", values.shown("loss_m_s", 1e3, "mm/s"))
+            summary: Summary::WithSize(|values| {
+                Statement::of(MEANING, format!("{} of speed lost", values.shown("loss_m_s", 1e3, "mm/s")))
             }),
             benchmark: Benchmark {
                 // Which fraction of a count was lost.

@@ -13,7 +13,7 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::{Benchmark, ParameterLaw};
-use crate::description::{Description, Summary};
+use crate::description::{Description, Statement, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
@@ -65,11 +65,11 @@ impl PhysicalEffect for MissedCounts {
 
     fn description() -> Description {
         Description {
-            summary: Summary::WithValues(|values| {
+            summary: Summary::WithSize(|values| {
                 let [left, right] = ["left_lost_share", "right_lost_share"].map(|name| values.shown(name, 100.0, "%"));
                 let hinge = values.value("hinge_speed_m_s");
                 let hinge = hinge.map_or_else(|| "some speed".to_owned(), |hinge| format!("{hinge:.2} m/s"));
-                format!("{MEANING}: {left} on the left, {right} on the right above {hinge}")
+                Statement::of(MEANING, format!("{left} on the left, {right} on the right above {hinge}"))
             }),
             benchmark: Benchmark {
                 values: ParameterLaw::Direction {

@@ -10,11 +10,14 @@ use kinematics::{Pose, Wheels};
 use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
-use crate::description::{Description, Summary};
+use crate::description::{Description, Statement, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, SampleClock};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
 use crate::on_board::{Code, OnBoard};
+
+/// What it is, in one line.
+const MEANING: &str = "the right counter is read later than the left one";
 
 /// The mean term in C, for a robot's own odometry.
 const ON_BOARD: OnBoard = OnBoard::State {
@@ -46,11 +49,13 @@ impl PhysicalEffect for SamplingSkew {
 
     fn description() -> Description {
         Description {
-            summary: Summary::WithValues(|values| {
-                format!("the right counter is read {} after the left one", values.shown("right_delay_s", 1e3, "ms"))
+            summary: Summary::WithSize(|values| {
+                let left = "the left counter is read later than the right one";
+                let what = values.by_sign("right_delay_s", MEANING, left);
+                Statement::of(what, format!("by {}", values.magnitude("right_delay_s", 1e3, "ms")))
             }),
             on_board: ON_BOARD,
-            ..Description::of("the right counter is read later than the left one")
+            ..Description::of(MEANING)
         }
     }
 
@@ -77,9 +82,9 @@ impl Forward for State {
 struct Term;
 
 impl ModelTerm for Term {
-    /// Plausible: 2 ms, one sample time of a slow controller.
+    /// Plausible: 10 ms, two controllers that are asked one after the other over a bus.
     fn parameters(&self) -> &'static [TermParameter] {
-        &[TermParameter { name: "right_delay_s", unit: "s", prior_sigma: 2e-3 }]
+        &[TermParameter { name: "right_delay_s", unit: "s", prior_sigma: 1e-2 }]
     }
 
     /// Of the right wheel's counts, its delay times the speed gained came too early.

@@ -12,7 +12,7 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::{Benchmark, FloorForm};
-use crate::description::{Description, Summary};
+use crate::description::{Description, Statement, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
@@ -55,7 +55,10 @@ impl PhysicalEffect for SlipAcceleration {
 
     fn description() -> Description {
         Description {
-            summary: Summary::WithValues(|values| format!("{MEANING} by {}", values.shown("kappa_s", 1e3, "ms"))),
+            summary: Summary::WithSize(|values| {
+                let what = values.by_sign("kappa_s", MEANING, "the ground speed is ahead of the wheels'");
+                Statement::of(what, format!("by {}", values.magnitude("kappa_s", 1e3, "ms")))
+            }),
             benchmark: Benchmark::OF_MEAN.with_form(
                 "slip that saturates, as tanh of the acceleration",
                 |values, robot| {

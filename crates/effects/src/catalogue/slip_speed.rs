@@ -11,7 +11,7 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::{Benchmark, FloorForm};
-use crate::description::{Description, Summary};
+use crate::description::{Description, Statement, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
@@ -48,8 +48,10 @@ impl PhysicalEffect for SlipSpeed {
 
     fn description() -> Description {
         Description {
-            summary: Summary::WithValues(|values| {
-                format!("{MEANING}: {} of it for each m/s", values.shown("slip_s_m", 100.0, "%"))
+            summary: Summary::WithSize(|values| {
+                let gain = "the wheels gain distance in proportion to their speed";
+                let what = values.by_sign("slip_s_m", MEANING, gain);
+                Statement::of(what, format!("{} for each m/s", values.magnitude("slip_s_m", 100.0, "%")))
             }),
             // Pacejka 2012: the force of a tyre saturates with its slip.
             benchmark: Benchmark::OF_MEAN.with_form(

@@ -12,14 +12,14 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::Benchmark;
-use crate::description::{Description, Excitation, Summary};
+use crate::description::{Description, Excitation, Statement, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, RunStart, Step};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
 use crate::on_board::{Code, Input, OnBoard};
 
 /// What it is, in one line.
-const MEANING: &str = "the scale drifts with the time of the session";
+const MEANING: &str = "the wheels' scale drifts over the session";
 
 /// Time constants that are tried, seconds: tyres take from minutes to an hour.
 const TAU_S: [f64; 5] = [150.0, 300.0, 600.0, 1200.0, 3600.0];
@@ -63,8 +63,11 @@ impl PhysicalEffect for ThermalDrift {
 
     fn description() -> Description {
         Description {
-            summary: Summary::WithValues(|values| {
-                format!("{MEANING}, by {} in the end", values.shown("growth", 100.0, "%"))
+            summary: Summary::WithSize(|values| {
+                Statement::of(
+                    MEANING,
+                    values.with_direction("growth", (100.0, "%"), "larger at the end", "smaller at the end"),
+                )
             }),
             excitation: Excitation::Conditions("drive the same runs cold and an hour later"),
             benchmark: Benchmark::of_mean_at(|_, _, stream| vec![("tau_s", stream.log_uniform(60.0, 1000.0))])

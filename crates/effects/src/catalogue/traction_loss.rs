@@ -81,7 +81,7 @@ impl PhysicalEffect for TractionLoss {
                 })
             },
             on_board: on_board::ON_BOARD,
-            ..Description::of("a wheel that is accelerated harder than the floor holds slides")
+            ..Description::of("a wheel slides under hard acceleration")
         }
     }
 

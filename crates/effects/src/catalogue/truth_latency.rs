@@ -9,11 +9,11 @@
 //! ms, in published logs up to 0.3 s.
 
 use dataset::RunInfo;
-use kinematics::{Pose, Twist};
+use kinematics::Pose;
 use model_term::{Interval, Measurement, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
-use crate::description::{Description, Summary};
+use crate::description::{Description, Statement, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, PoseReading};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
@@ -21,7 +21,7 @@ use crate::on_board::OnBoard;
 use crate::time_shift::{LONGEST_S, TimeShift};
 
 /// What it is, in one line.
-const MEANING: &str = "the instrument's measurements are late";
+const MEANING: &str = "the instrument's timestamps are late";
 
 /// Delay of the instrument's stamps.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -48,8 +48,9 @@ impl PhysicalEffect for TruthLatency {
         Description {
             clock_offset: Some("delay_s"),
             is_delay: true,
-            summary: Summary::WithValues(|values| {
-                format!("{MEANING} by {}: nothing is wrong with the robot", values.shown("delay_s", 1e3, "ms"))
+            summary: Summary::WithSize(|values| {
+                let what = values.by_sign("delay_s", MEANING, "the instrument's timestamps are early");
+                Statement::of(what, format!("by {}", values.magnitude("delay_s", 1e3, "ms")))
             }),
             on_board: OnBoard::OfInstrument,
             ..Description::of(MEANING)
@@ -109,8 +110,8 @@ impl ModelTerm for Term {
 
     fn measurement(&mut self, measurement: &Measurement<'_>, gradient: &mut [Pose]) {
         gradient[0] = if self.delay_s == 0.0 {
-            let Twist { v_m_s, omega_rad_s } = measurement.twist;
-            Pose::new(-v_m_s, 0.0, -omega_rad_s)
+            let (of_counts, of_terms) = (measurement.twist, measurement.twist_of_terms);
+            Pose::new(-of_counts.v_m_s - of_terms.v_m_s, 0.0, -of_counts.omega_rad_s - of_terms.omega_rad_s)
         } else {
             let seen = self.shift.seen(measurement, self.delay_s);
             Pose::new(seen.x_m / self.delay_s, seen.y_m / self.delay_s, seen.theta_rad / self.delay_s)
@@ -120,6 +121,7 @@ impl ModelTerm for Term {
 
 #[cfg(test)]
 mod tests {
+    use kinematics::Twist;
     use model_term::NoRecord;
 
     use super::*;
@@ -132,8 +134,14 @@ mod tests {
         assert_eq!(reading, PoseReading { t_s: 1.05, world_from_body: Pose::IDENTITY });
         let (run, twist) = (RunInfo::default(), Twist { v_m_s: 0.4, omega_rad_s: -0.2 });
         let mut gradient = [Pose::IDENTITY];
-        let measurement =
-            Measurement { t_s: 1.05, world_from_body: Pose::IDENTITY, twist, record: &NoRecord, run: &run };
+        let measurement = Measurement {
+            t_s: 1.05,
+            world_from_body: Pose::IDENTITY,
+            twist,
+            twist_of_terms: Twist::default(),
+            record: &NoRecord,
+            run: &run,
+        };
         Term::default().measurement(&measurement, &mut gradient);
         assert_eq!(gradient, [Pose::new(-0.4, 0.0, 0.2)]);
     }

@@ -12,14 +12,14 @@ use kinematics::Pose;
 use model_term::{Measurement, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
-use crate::description::{Description, Extrinsic, Summary};
+use crate::description::{Description, Extrinsic, Statement, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, PoseReading};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
 use crate::on_board::OnBoard;
 
 /// What it is, in one line.
-const MEANING: &str = "the instrument's marker is not over the axle's centre";
+const MEANING: &str = "the instrument's marker is off the axle's centre";
 
 /// Where the instrument's point is on the robot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -47,9 +47,10 @@ impl PhysicalEffect for TruthLeverArm {
 
     fn description() -> Description {
         Description {
-            summary: Summary::WithValues(|values| {
-                let [ahead, left] = ["lever_x_m", "lever_y_m"].map(|name| values.shown(name, 1e3, "mm"));
-                format!("{MEANING}, but {ahead} ahead and {left} to the left: nothing is wrong with the robot")
+            summary: Summary::WithSize(|values| {
+                let ahead = values.with_direction("lever_x_m", (1e3, "mm"), "ahead", "behind");
+                let aside = values.with_direction("lever_y_m", (1e3, "mm"), "to the left", "to the right");
+                Statement::of(MEANING, format!("{ahead} and {aside}"))
             }),
             extrinsic: Some(Extrinsic::Position),
             on_board: OnBoard::OfInstrument,

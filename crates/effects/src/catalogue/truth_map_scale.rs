@@ -15,7 +15,7 @@ use model_term::{Interval, Measurement, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::{Benchmark, Needs};
-use crate::description::{Description, Excitation, Summary};
+use crate::description::{Description, Excitation, Statement, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, PoseReading};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
@@ -54,11 +54,11 @@ impl PhysicalEffect for TruthMapScale {
 
     fn description() -> Description {
         Description {
-            summary: Summary::WithValues(|values| {
-                format!("{MEANING}, by {}: nothing is wrong with the robot", values.shown("scale_error", 100.0, "%"))
+            summary: Summary::WithSize(|values| {
+                Statement::of(MEANING, values.with_direction("scale_error", (100.0, "%"), "too large", "too small"))
             }),
             excitation: Excitation::Conditions("measure a straight by tape, in a run without poses (distance.csv)"),
-            benchmark: Benchmark { needs: Needs { length: true, ..Needs::NONE }, ..Benchmark::OF_MEAN },
+            benchmark: Benchmark { needs: Needs { others: true, ..Needs::NONE }, ..Benchmark::OF_MEAN },
             on_board: OnBoard::OfInstrument,
             ..Description::of(MEANING)
         }

@@ -11,14 +11,14 @@ use kinematics::Pose;
 use model_term::{Measurement, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
-use crate::description::{Description, Extrinsic, Summary};
+use crate::description::{Description, Extrinsic, Statement, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, PoseReading};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
 use crate::on_board::OnBoard;
 
 /// What it is, in one line.
-const MEANING: &str = "the instrument's frame is turned on the robot";
+const MEANING: &str = "the instrument is mounted at an angle";
 
 /// Turn of the instrument's frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -43,9 +43,10 @@ impl PhysicalEffect for TruthYaw {
 
     fn description() -> Description {
         Description {
-            summary: Summary::WithValues(|values| {
-                let yaw = values.shown("yaw_rad", 180.0 / std::f64::consts::PI, "°");
-                format!("{MEANING} by {yaw} (or both wheels toe by as much)")
+            summary: Summary::WithSize(|values| {
+                let degrees = (180.0 / std::f64::consts::PI, "°");
+                let turned = values.with_direction("yaw_rad", degrees, "to the left", "to the right");
+                Statement::of(MEANING, format!("{turned} (or toe of both wheels)"))
             }),
             extrinsic: Some(Extrinsic::Heading),
             on_board: OnBoard::OfInstrument,

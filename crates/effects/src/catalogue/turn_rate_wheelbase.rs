@@ -13,7 +13,7 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::{Benchmark, FloorForm, contact_twist};
-use crate::description::{Description, Summary};
+use crate::description::{Description, Statement, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
@@ -49,8 +49,10 @@ impl PhysicalEffect for TurnRateWheelbase {
 
     fn description() -> Description {
         Description {
-            summary: Summary::WithValues(|values| {
-                format!("{MEANING}: {} for each rad/s", values.shown("beta_s", 100.0, "%"))
+            summary: Summary::WithSize(|values| {
+                let nearer = "the faster the robot turns, the nearer together its wheels act";
+                let what = values.by_sign("beta_s", MEANING, nearer);
+                Statement::of(what, format!("{} for each rad/s", values.magnitude("beta_s", 100.0, "%")))
             }),
             benchmark: Benchmark::OF_MEAN.with_form(
                 "a wheelbase that grows with the square of the yaw rate",

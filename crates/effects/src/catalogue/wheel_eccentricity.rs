@@ -14,7 +14,7 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::Benchmark;
-use crate::description::{Description, Summary};
+use crate::description::{Description, Statement, Summary};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Step};
 use crate::hypothesis::{Hypothesis, LastAngle, Variant, value_of};
@@ -83,8 +83,8 @@ impl PhysicalEffect for WheelEccentricity {
 
     fn description() -> Description {
         Description {
-            summary: Summary::WithValues(|values| {
-                format!("{MEANING}: {}", values.amplitudes("", 100.0, "%", "wheel's radius varies"))
+            summary: Summary::WithSize(|values| {
+                Statement::of(MEANING, values.amplitudes("", 100.0, "%", "wheel's radius varies"))
             }),
             benchmark: Benchmark::OF_MEAN.with_form(
                 "a radius that rises and falls linearly with the wheel's angle, a triangle for a sine",

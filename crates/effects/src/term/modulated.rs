@@ -126,8 +126,14 @@ mod tests {
             run: &run,
         };
         let twist = Twist { v_m_s: -0.2, omega_rad_s: -0.5 };
-        let measurement =
-            Measurement { t_s: 30.0, world_from_body: Pose::IDENTITY, twist, record: &NoRecord, run: &run };
+        let measurement = Measurement {
+            t_s: 30.0,
+            world_from_body: Pose::IDENTITY,
+            twist,
+            twist_of_terms: Twist::default(),
+            record: &NoRecord,
+            run: &run,
+        };
         // 0.5 · 1 − 0.2 · 10 = −1.5 along. At −0.2 m/s and −0.5 rad/s, half a minute from the start.
         for (by, value) in [(Covariate::AbsSpeed, 0.2), (Covariate::AbsYawRate, 0.5), (Covariate::RunTime, 0.5)] {
             let mut term = Modulated::new(Box::new(Two), vec![0.5, -0.2], by);
@@ -143,8 +149,14 @@ mod tests {
     fn what_no_measurement_knows_leaves_what_is_seen_alone() {
         let run = RunInfo::default();
         let twist = Twist { v_m_s: 1.0, omega_rad_s: 1.0 };
-        let measurement =
-            Measurement { t_s: 1.0, world_from_body: Pose::IDENTITY, twist, record: &NoRecord, run: &run };
+        let measurement = Measurement {
+            t_s: 1.0,
+            world_from_body: Pose::IDENTITY,
+            twist,
+            twist_of_terms: Twist::default(),
+            record: &NoRecord,
+            run: &run,
+        };
         let mut gradient = [Pose::IDENTITY];
         let term = Box::new(Two);
         Modulated::new(term, vec![1.0, 1.0], Covariate::Acceleration).measurement(&measurement, &mut gradient);

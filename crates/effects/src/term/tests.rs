@@ -117,12 +117,18 @@ fn what_makes_no_term_says_why() {
     assert!(problem(&term(Channel::Along, &["1"])).contains("vanish at standstill"));
     assert!(problem(&term(Channel::Along, &["1", "v"])).contains("no covariate \"1\""));
     let of_a_wheel = problem(&term(Channel::Along, &["wheel sense"]));
-    assert!(of_a_wheel.contains("\"wheel sense\" goes with wheels, left_wheel, right_wheel alone"), "{of_a_wheel}");
+    assert!(
+        of_a_wheel.contains("\"wheel sense\" is a covariate of wheels, left_wheel, right_wheel alone"),
+        "{of_a_wheel}"
+    );
     assert_eq!(term(Channel::Wheels, &["wheel v", "row length"]).check(), Ok(()));
     let of_rows = problem(&term(Channel::Yaw, &["omega", "row length"]));
-    assert!(of_rows.contains("\"row length\" goes with the channel wheels and \"wheel v\" alone"), "{of_rows}");
+    assert!(
+        of_rows.contains("\"row length\" is a covariate of the channel wheels with \"wheel v\" alone"),
+        "{of_rows}"
+    );
     let seen = problem(&term(Channel::OffsetAlong, &["session time"]));
-    assert!(seen.contains("seen_along goes with these alone") && seen.contains("\"cos(theta)\""), "{seen}");
+    assert!(seen.contains("seen_along takes these covariates alone") && seen.contains("\"cos(theta)\""), "{seen}");
     let endless = SparseTerm { coefficient: f64::NAN, ..term(Channel::Yaw, &["v"]) };
     assert!(problem(&endless).contains("coefficient is NaN"));
     let of_runs = |key: &str, values: &[f64]| {

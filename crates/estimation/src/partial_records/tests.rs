@@ -37,6 +37,12 @@ fn windows_of(rows: &[(f64, [f64; 2], f64)], first: f64, is_instantaneous: bool,
 const STILL: [f64; 2] = [0.0; 2];
 const TURNING: [f64; 2] = [-0.5, 0.5];
 
+/// The gyroscope of a session, by its stated drive.
+fn of(session: &Session<'_>) -> GyroSettings {
+    let drive = Model::of(&session.robot.geometry().expect("a drive"), 0);
+    GyroSettings::of(session, Some(&drive))
+}
+
 #[test]
 fn windows_hold_whole_rows_up_to_their_length_and_what_was_turned_in_them() {
     // Quarters of a second, of which two fit into 0.5 s, to the last bit.
@@ -88,7 +94,7 @@ fn noise_of_standstills_is_half_of_the_mean_square_change_of_the_rate() {
     // n² (1/T + 1/T): n = a √(2 T).
     let of = |runs: Vec<Run>| {
         let dataset = dataset(runs);
-        GyroSettings::of(&dataset.session()).noise_rad_per_sqrt_s
+        of(&dataset.session()).noise_rad_per_sqrt_s
     };
     let found = of(vec![run(&standing(60, 0.02))]).expect("it stands");
     let on_paper = 0.02 * 0.2_f64.sqrt();
@@ -129,7 +135,7 @@ fn noise_of_a_robot_that_hardly_stands_is_how_it_strays_from_the_wheels() {
     let mut all = standing(49, 0.5);
     all.truncate(50);
     let moving = dataset(vec![run(&rows)]);
-    let found = GyroSettings::of(&moving.session()).noise_rad_per_sqrt_s.expect("it moves");
+    let found = of(&moving.session()).noise_rad_per_sqrt_s.expect("it moves");
     // Every pair of windows of a second has the square 0.04²/2, of χ² with its median.
     let on_paper = 0.04 / (2.0 * CHI_SQUARE_1_MEDIAN).sqrt();
     // Windows of sums of tenths are a second to 1e-14. Rejects rates that are not held against wheels.
@@ -137,7 +143,7 @@ fn noise_of_a_robot_that_hardly_stands_is_how_it_strays_from_the_wheels() {
     let mut both = rows.clone();
     both.splice(0..0, all);
     let with_few = dataset(vec![run(&both)]);
-    let found = GyroSettings::of(&with_few.session()).noise_rad_per_sqrt_s.expect("it moves");
+    let found = of(&with_few.session()).noise_rad_per_sqrt_s.expect("it moves");
     // Of fourteen pairs four are of the standstill, one begins in it, and nine have the median.
     assert!((found / on_paper - 1.0).abs() < 1e-9, "{found} {on_paper}");
 }
@@ -147,7 +153,7 @@ fn what_is_stated_of_a_gyroscopes_noise_is_taken() {
     let mut log = dataset(vec![run(&standing(60, 0.02))]);
     log.truth_noise.gyro.noise_rad_per_sqrt_s = Some(0.5);
     let (session, rows) = (log.session(), standing(60, 0.02).len());
-    let settings = GyroSettings::of(&session);
+    let settings = of(&session);
     let track = WheelAngleInterpolator::of(&session.runs[0], session.robot).expect("a track");
     let found = settings.windows(&session.runs[0], &track);
     // 61 rows of a tenth of a second in windows of a second; their variance grows with their length.

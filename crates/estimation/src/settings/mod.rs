@@ -119,10 +119,25 @@ pub(crate) const LATENCY_PRIOR_SIGMA_S: f64 = 0.1;
 /// Tuned: by hand; no record of what on.
 pub(crate) const MAX_POSTERIOR_TO_PRIOR_SIGMA: f64 = 0.5;
 
+/// Relative. A stated length that is farther from what the windows of motion show is not where a fit starts.
+/// Budgeted: from a quarter away, which is as far as rulers and tyres go, steps end in the same minimum
+/// (tests/command/misdeclared.rs).
+pub(crate) const MIN_START_DEVIATION: f64 = 0.22;
+
+/// Seconds. A clock that is seen to be farther off is taken off the stamps before the fit, and its rest is
+/// fitted.
+/// Budgeted: the fit of a latency from 0 ends at a smaller one (tests/command/bad_logs.rs).
+pub(crate) const MIN_START_CLOCK_S: f64 = 0.05;
+
 /// Sensor heading, radians, beyond which the extrinsics are free from the first fit on.
 /// Less may be an error of a short log.
 /// Tuned: by hand; no record of what on.
 pub(crate) const ROTATED_SENSOR_RAD: f64 = 0.2;
+
+/// The same where windows of motion determine the drive.
+/// Tuned: on a tag turned by 3 to 10° and up to 150 ms late (tests/command/moved_instrument.rs): without its
+/// heading, the first fit did not converge.
+pub(crate) const TURNED_SENSOR_RAD: f64 = 0.05;
 
 /// Ratio of chord to distance below which a motion has no direction for the sensor's heading.
 /// Tuned: by hand; no record of what on.

@@ -47,7 +47,7 @@ pub(super) fn render(robot: &CalibratedRobot, _: &Options) -> Result<String, Exp
         "//",
         &format!(
             "What these defines cannot express: counts of a turn are whole numbers, which leaves the left wheel wrong \
-             by {:.4} % against the right one; anything that goes with speed, load or direction.",
+             by {:.4} % against the right one; anything that depends on speed, load or direction.",
             100.0 * left_over_right_error
         ),
     ));
@@ -95,7 +95,8 @@ mod tests {
                 "#define COUNTS_PER_REV1 9900 // left; COUNTS_PER_REV3 of four wheels too\n",
                 "#define COUNTS_PER_REV2 10101 // right; COUNTS_PER_REV4 of four wheels too\n",
                 "// What these defines cannot express: counts of a turn are whole numbers, which leaves the left\n",
-                "//  wheel wrong by 0.0099 % against the right one; anything that goes with speed, load or direction.\n",
+                "//  wheel wrong by 0.0099 % against the right one; anything that depends on speed, load or\n",
+                "//  direction.\n",
             )
         );
     }

@@ -1,11 +1,15 @@
 //! Formats of robots' programs: one file a format, and this table of contents.
 
 mod c;
+mod clearpath;
+mod create3;
 mod linorobot2;
 mod mm;
 mod roadrunner;
+mod robot_localization;
 mod ros2_yaml;
 mod turtlebot3;
+mod urdf;
 mod wpilib;
 
 use crate::error::ExportError;
@@ -21,6 +25,8 @@ pub struct Exporter {
     pub about: &'static str,
     /// Flags that it takes beside those of all formats.
     pub takes: &'static [&'static str],
+    /// How its values are put into a file that is there.
+    pub place: Place,
     /// Effects with statements in C are exported, and not left out.
     pub has_effects: bool,
     /// The file's text.
@@ -30,19 +36,48 @@ pub struct Exporter {
     pub render: fn(&CalibratedRobot, &Options) -> Result<String, ExportError>,
 }
 
+/// How values of a format are put into a robot's own file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// They are not: the format is a file of its own.
+    None,
+    /// Under the same keys.
+    Keys,
+    /// In joints and shapes of links.
+    Joints,
+}
+
 /// All formats of calibrations; a new one is its file and its line here.
 pub const EXPORTERS: &[Exporter] = &[
     Exporter {
         name: "c",
         about: "odometry as one C99 header, effects of an extended model too",
         takes: &["counter-bits"],
+        place: Place::None,
         has_effects: true,
         render: c::render,
+    },
+    Exporter {
+        name: "clearpath",
+        about: "parameters of Clearpath's platform_velocity_controller, in robot.yaml",
+        takes: &["controller", "lengths", "multipliers", "speed", "rate"],
+        place: Place::Keys,
+        has_effects: false,
+        render: clearpath::render,
+    },
+    Exporter {
+        name: "create3",
+        about: "parameters of the Create 3's diffdrive_controller",
+        takes: &["controller", "lengths", "multipliers", "speed", "rate"],
+        place: Place::Keys,
+        has_effects: false,
+        render: create3::render,
     },
     Exporter {
         name: "linorobot2",
         about: "C defines for the firmware of linorobot2",
         takes: &[],
+        place: Place::Keys,
         has_effects: false,
         render: linorobot2::render,
     },
@@ -50,6 +85,7 @@ pub const EXPORTERS: &[Exporter] = &[
         name: "mm",
         about: "a table in millimetres, for people",
         takes: &[],
+        place: Place::None,
         has_effects: false,
         render: mm::render,
     },
@@ -57,27 +93,47 @@ pub const EXPORTERS: &[Exporter] = &[
         name: "roadrunner",
         about: "parameters of Road Runner's TankDrive (FTC), inches",
         takes: &[],
+        place: Place::Keys,
         has_effects: false,
         render: roadrunner::render,
+    },
+    Exporter {
+        name: "robot-localization",
+        about: "what an EKF of robot_localization takes of the wheels, and their covariance",
+        takes: &["controller", "speed", "rate"],
+        place: Place::None,
+        has_effects: false,
+        render: robot_localization::render,
     },
     Exporter {
         name: "ros2-yaml",
         about: "parameters of ROS 2's diff_drive_controller",
         takes: &["controller", "lengths", "multipliers", "speed", "rate"],
+        place: Place::Keys,
         has_effects: false,
         render: ros2_yaml::render,
     },
     Exporter {
         name: "turtlebot3",
         about: "parameters of turtlebot3_node",
-        takes: &[],
+        takes: &["controller"],
+        place: Place::Keys,
         has_effects: false,
         render: turtlebot3::render,
+    },
+    Exporter {
+        name: "urdf",
+        about: "radii of the wheels and origins of their joints",
+        takes: &[],
+        place: Place::Joints,
+        has_effects: false,
+        render: urdf::render,
     },
     Exporter {
         name: "wpilib",
         about: "Java constants for WPILib's differential drive (FRC)",
         takes: &[],
+        place: Place::Keys,
         has_effects: false,
         render: wpilib::render,
     },

@@ -37,7 +37,7 @@ pub(super) fn render(robot: &CalibratedRobot, _: &Options) -> Result<String, Exp
     text.push_str(&wrapped(
         "//",
         "What these parameters cannot express: the difference of the sides, unless your localizer scales the ticks of \
-         each by the values above; anything that goes with speed, load or direction.",
+         each by the values above; anything that depends on speed, load or direction.",
     ));
     text.push_str(&limits("//", robot, false));
     Ok(text)
@@ -62,7 +62,7 @@ mod tests {
                 "// left side alone: 0.002498431953 in per tick\n",
                 "// right side alone: 0.002448958053 in per tick\n",
                 "// What these parameters cannot express: the difference of the sides, unless your localizer scales\n",
-                "//  the ticks of each by the values above; anything that goes with speed, load or direction.\n",
+                "//  the ticks of each by the values above; anything that depends on speed, load or direction.\n",
             )
         );
     }

@@ -26,7 +26,18 @@ use crate::settings::{POSE_TRAVEL_M, UNMEASURED_VARIANCE};
 const DECIMALS: usize = 9;
 
 pub(super) fn render(robot: &CalibratedRobot, options: &Options) -> Result<String, ExportError> {
-    let mut text = origin("#", "ros2-yaml", robot);
+    let controller = options.controller.as_deref().unwrap_or("diff_drive_controller");
+    of_node(robot, options, "ros2-yaml", &[controller, "ros__parameters"])
+}
+
+/// The parameters under the keys of a node, with what they are and what they cannot express.
+pub(super) fn of_node(
+    robot: &CalibratedRobot,
+    options: &Options,
+    format: &str,
+    keys: &[&str],
+) -> Result<String, ExportError> {
+    let mut text = origin("#", format, robot);
     let how = match options.lengths {
         Lengths::Nominal => {
             "Nominal lengths with multipliers: the controller multiplies them to the calibrated ones. \
@@ -38,21 +49,28 @@ pub(super) fn render(robot: &CalibratedRobot, options: &Options) -> Result<Strin
         }
     };
     text.push_str(&wrapped("#", how));
-    let _ = writeln!(text, "{}:\n  ros__parameters:", key(&options.controller));
-    lengths(&mut text, robot, options.lengths)?;
-    covariances(&mut text, robot, options);
+    for (depth, name) in keys.iter().enumerate() {
+        let _ = writeln!(text, "{}{}:", "  ".repeat(depth), key(name));
+    }
+    let mut body = String::new();
+    lengths(&mut body, robot, options.lengths)?;
+    covariances(&mut body, robot, options);
+    for line in body.lines() {
+        // Written for two keys.
+        let _ = writeln!(text, "{}{line}", "  ".repeat(keys.len() - 2));
+    }
     text.push_str(&wrapped(
         "#",
-        "What these parameters cannot express: anything that goes with speed, load, direction or the phase of a wheel.",
+        "What these parameters cannot express: anything that depends on speed, load, direction or the phase of a wheel.",
     ));
     text.push_str(&limits("#", robot, false));
     Ok(text)
 }
 
 /// A node's name as a key of YAML.
-fn key(name: &str) -> String {
-    let is_plain = |letter: char| letter.is_ascii_alphanumeric() || "_-/".contains(letter);
-    if !name.is_empty() && name.chars().all(is_plain) {
+pub(super) fn key(name: &str) -> String {
+    let is_plain = |letter: char| letter.is_ascii_alphanumeric() || "_-/*".contains(letter);
+    if !name.is_empty() && !name.starts_with('*') && name.chars().all(is_plain) {
         name.to_owned()
     } else {
         format!("'{}'", comment(name).replace('\'', "''"))
@@ -135,7 +153,7 @@ fn covariances(text: &mut String, robot: &CalibratedRobot, options: &Options) {
         &format!(
             "Covariances are of x, y, z, roll, pitch, yaw, from the fitted noise of the wheels, {k_mm} mm/√m. Twist: \
              over one interval at {rate} Hz, {speed} m/s straight on; it grows in proportion to speed and rate. \
-             Sideways the model has no motion: the variance ahead stands there. Pose: after {} m straight on; that \
+             Sideways the model has no motion: it has the variance ahead. Pose: after {} m straight on; that \
              of dead reckoning grows without bound, which no constant can say: let a filter take the twist.",
             decimal(POSE_TRAVEL_M, 1)
         ),
@@ -151,7 +169,7 @@ fn covariances(text: &mut String, robot: &CalibratedRobot, options: &Options) {
 }
 
 /// Variances of x, y (m²) and yaw (rad²) after a travel straight on.
-fn pose_variances(noise: OdometryNoise, separation_m: f64) -> [f64; 3] {
+pub(super) fn pose_variances(noise: OdometryNoise, separation_m: f64) -> [f64; 3] {
     let mut covariance = OdometryCovariance::default();
     let wheels = WheelNoise { sigma_m_per_sqrt_m: Wheels::both(noise.wheel_sigma_m_per_sqrt_m) };
     covariance.propagate(Pose::IDENTITY, Wheels::both(POSE_TRAVEL_M), separation_m, &wheels);
@@ -159,7 +177,7 @@ fn pose_variances(noise: OdometryNoise, separation_m: f64) -> [f64; 3] {
 }
 
 /// Variances of the speeds ahead and aside (m²/s²) and of the yaw rate (rad²/s²) over one interval.
-fn twist_variances(noise: OdometryNoise, separation_m: f64, options: &Options) -> [f64; 3] {
+pub(super) fn twist_variances(noise: OdometryNoise, separation_m: f64, options: &Options) -> [f64; 3] {
     let wheel = noise.wheel_sigma_m_per_sqrt_m.powi(2) * options.speed_m_s * options.rate_hz;
     [0.5 * wheel, 0.5 * wheel, 2.0 * wheel / separation_m.powi(2)]
 }
@@ -192,12 +210,12 @@ mod tests {
              \u{20}   right_wheel_radius_multiplier: 0.99  # ± 0.00010: 99.000 mm ± 0.010 mm instead of 100.000 mm\n\
              \u{20}   # Covariances are of x, y, z, roll, pitch, yaw, from the fitted noise of the wheels, 1.0 mm/√m.\n\
              \u{20}   #  Twist: over one interval at 50.0 Hz, 0.25 m/s straight on; it grows in proportion to speed\n\
-             \u{20}   #  and rate. Sideways the model has no motion: the variance ahead stands there. Pose: after 1.0\n\
-             \u{20}   #  m straight on; that of dead reckoning grows without bound, which no constant can say: let a\n\
+             \u{20}   #  and rate. Sideways the model has no motion: it has the variance ahead. Pose: after 1.0 m\n\
+             \u{20}   #  straight on; that of dead reckoning grows without bound, which no constant can say: let a\n\
              \u{20}   #  filter take the twist.\n\
              \u{20}   pose_covariance_diagonal: [5.00e-7, 4.00e-6, 1.00e+6, 1.00e+6, 1.00e+6, 1.20e-5]\n\
              \u{20}   twist_covariance_diagonal: [6.25e-6, 6.25e-6, 1.00e+6, 1.00e+6, 1.00e+6, 1.50e-4]\n\
-             # What these parameters cannot express: anything that goes with speed, load, direction or the phase\n\
+             # What these parameters cannot express: anything that depends on speed, load, direction or the phase\n\
              #  of a wheel.\n"
         );
     }
@@ -246,8 +264,8 @@ mod tests {
     #[test]
     fn names_of_nodes_are_keys() {
         assert_eq!(
-            (key("/base/drive_1"), key("a: b"), key("it's\n")),
-            ("/base/drive_1".into(), "'a: b'".into(), "'it''s '".into())
+            (key("/base/drive_1"), key("a: b"), key("it's\n"), key("/**"), key("*a")),
+            ("/base/drive_1".into(), "'a: b'".into(), "'it''s '".into(), "/**".into(), "'*a'".into())
         );
     }
 }

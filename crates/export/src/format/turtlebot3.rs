@@ -6,13 +6,14 @@ use std::fmt::Write;
 
 use crate::comment::{decimal, digits, limits, mm, origin, plus_minus_mm, wrapped};
 use crate::error::ExportError;
+use crate::format::ros2_yaml::key;
 use crate::options::Options;
 use crate::robot::CalibratedRobot;
 
 /// Decimals of lengths, metres.
 const DECIMALS: usize = 9;
 
-pub(super) fn render(robot: &CalibratedRobot, _: &Options) -> Result<String, ExportError> {
+pub(super) fn render(robot: &CalibratedRobot, options: &Options) -> Result<String, ExportError> {
     let radius_m = 0.5 * robot.mean_diameter_m();
     let separation = &robot.wheel_separation;
     let instead =
@@ -26,7 +27,8 @@ pub(super) fn render(robot: &CalibratedRobot, _: &Options) -> Result<String, Exp
         "#",
         "Replace these two in burger.yaml or waffle.yaml. OpenCR's firmware has lengths of its own for cmd_vel.",
     ));
-    text.push_str("/**:\n  turtlebot3_node:\n    ros__parameters:\n      wheels:\n");
+    let node = options.controller.as_deref().unwrap_or("turtlebot3_node");
+    let _ = writeln!(text, "/**:\n  {}:\n    ros__parameters:\n      wheels:", key(node));
     let _ = writeln!(
         text,
         "        separation: {}  # m, {}{}",

@@ -34,7 +34,7 @@ pub(super) fn render(robot: &CalibratedRobot, _: &Options) -> Result<String, Exp
     text.push_str("}\n");
     text.push_str(&wrapped(
         "//",
-        "What these constants cannot express: anything that goes with speed, load, direction or the phase of a wheel.",
+        "What these constants cannot express: anything that depends on speed, load, direction or the phase of a wheel.",
     ));
     text.push_str(&limits("//", robot, false));
     Ok(text)
@@ -64,7 +64,7 @@ mod tests {
                 "  /** Of the wheel, after gears: ± 0.063 mm, instead of 628.319 mm. */\n",
                 "  public static final double kRightMetersPerRotation = 0.622035345;\n",
                 "}\n",
-                "// What these constants cannot express: anything that goes with speed, load, direction or the phase\n",
+                "// What these constants cannot express: anything that depends on speed, load, direction or the phase\n",
                 "//  of a wheel.\n",
                 "// Caution: common_scale is not determined: * / closed.\n",
             )

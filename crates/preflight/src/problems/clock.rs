@@ -7,8 +7,8 @@ use crate::kind::{Kind, MirroredAxis};
 use crate::problem::{Problem, Severity, probability};
 use crate::session_check::{Matched, SessionCheck};
 use crate::settings::{
-    DECISIVE_RATIO, MAX_CLOCK_RATE, MAX_FITTED_OFFSET_S, MAX_UNEXPLAINED, MAX_WINDOWS, MIN_CLOCK_OFFSET_S,
-    MIN_CLOCK_RATE, MIN_GAIN, MIN_WARNED_OFFSET_S, MIN_WINDOWS, UNRELATED,
+    DECISIVE_RATIO, MAX_CLOCK_RATE, MAX_FITTED_OFFSET_S, MAX_LEFT_BY_FIX, MAX_NEAR_OFFSET_S, MAX_UNEXPLAINED,
+    MAX_WINDOWS, MIN_CLOCK_OFFSET_S, MIN_CLOCK_RATE, MIN_GAIN, MIN_WARNED_OFFSET_S, MIN_WINDOWS, UNRELATED,
 };
 use crate::windows::{Measured, Reading, windows};
 
@@ -97,22 +97,28 @@ fn is_decisive(found: &Explained, sound: &Explained) -> bool {
 }
 
 /// The best clock near the stated one, or anywhere if none is good there.
-fn best_clock(check: &SessionCheck, reading: Reading, now: Option<Explained>) -> Option<BestClock> {
+pub(crate) fn best_clock(check: &SessionCheck, reading: Reading, now: Option<Explained>) -> Option<BestClock> {
     let (windows, measured) = windows(&check.runs, reading, MAX_WINDOWS / 4);
     if windows.len() < MIN_WINDOWS {
         return None;
     }
     let comparison = Comparison { windows: &windows, measured, runs: &check.runs, m_per_rad: check.m_per_rad() };
     let is_good = |best: &BestClock| best.explained.unexplained.iter().any(|share| *share < MAX_UNEXPLAINED);
-    let near = if now.is_some() { comparison.best_offset(false) } else { None };
-    match near.filter(is_good) {
-        Some(near) => Some(near),
-        None => comparison.best_offset(true),
+    if now.is_some() {
+        // A path that repeats itself fits again a lap later: the clock is far off where that is decisive.
+        let close = comparison.best_offset(Some(MAX_FITTED_OFFSET_S)).filter(is_good);
+        let near = comparison.best_offset(Some(MAX_NEAR_OFFSET_S)).filter(is_good);
+        let is_farther =
+            |near: &BestClock| close.is_none_or(|close| near.explained.gain_over(&close.explained) > MIN_GAIN);
+        if let Some(found) = near.filter(is_farther).or(close) {
+            return Some(found);
+        }
     }
+    comparison.best_offset(None)
 }
 
 /// What an offset gains, if it matters.
-fn offset_gain(
+pub(crate) fn offset_gain(
     check: &SessionCheck,
     reading: Reading,
     as_is: Option<Explained>,
@@ -136,14 +142,17 @@ fn rate(check: &SessionCheck, reading: Reading, near: Clock) -> Option<(Clock, f
     let still = comparison.at(near)?;
     let (rated, found) = comparison.best_rate(near)?;
     let gain = found.gain_over(&still);
-    let matters = rated.rate.abs() > MIN_CLOCK_RATE && gain > MIN_GAIN;
+    let is_explained = found.unexplained.iter().all(|share| *share < MAX_LEFT_BY_FIX);
+    let matters = rated.rate.abs() > MIN_CLOCK_RATE && gain > MIN_GAIN && is_explained;
     (matters && found.ratio_to(&still) < 0.5 * (1.0 + DECISIVE_RATIO)).then_some((rated, gain))
 }
 
 /// Says how the instrument's records are to be read.
 fn say_reading(check: &mut SessionCheck, matched: &Matched, as_is: Option<Explained>) {
     let gain = as_is.map_or(MIN_GAIN, |sound| matched.explained.gain_over(&sound));
-    if matched.measured == Measured::Positions || matched.reading == Reading::AS_IS {
+    // What is named explains the log.
+    let is_explained = matched.explained.unexplained.iter().all(|share| *share < MAX_LEFT_BY_FIX);
+    if matched.measured == Measured::Positions || matched.reading == Reading::AS_IS || !is_explained {
         return;
     }
     let mut say = |kind: &Kind| check.problems.push(Problem::new(kind, Severity::Error, None, probability(gain)));

@@ -6,9 +6,10 @@
 
 use std::collections::BTreeMap;
 
-use dataset::MIN_LIDAR_TURN_RAD;
+use dataset::{MIN_LIDAR_TURN_RAD, TruthSample};
 use kinematics::{DriveGeometry, Pose, Rule, Wheels};
 
+use crate::driven::Driven;
 use crate::kind::Kind;
 use crate::problem::{Problem, Severity};
 use crate::run_log::{Part, RunLog};
@@ -29,24 +30,14 @@ pub(crate) fn found(check: &mut SessionCheck) {
     if !off && distance_m < MIN_DISTANCE_M * check.robot.left_wheel_diameter_m.min(0.15) / 0.15 {
         check.problems.push(Problem::new(&Kind::TooShort { distance_m }, Severity::Warning, None, 0.9));
     }
-    let (mut left_rad, mut right_rad) = (0.0, 0.0);
-    let mut whole_turns = true;
-    for run in &check.runs {
-        let travel_m =
-            Wheels { left: net(&run.wheels.left) * m_per_rad.left, right: net(&run.wheels.right) * m_per_rad.right };
-        let turned_rad = (travel_m.right - travel_m.left) / check.robot.wheel_separation_m;
-        whole_turns &= turned_rad.abs() > 0.5 * MIN_TURNING_RAD || run.protocol == Some(dataset::Protocol::Straight);
-        if turned_rad > 0.0 { left_rad += turned_rad } else { right_rad -= turned_rad }
-    }
+    let mut driven = Driven::default();
+    check.runs.iter().for_each(|run| driven.add(run, check.robot.wheel_separation_m, m_per_rad));
+    let Driven { left_rad, right_rad, .. } = driven;
     let all_rad = left_rad + right_rad;
-    if !off && whole_turns && all_rad > MIN_TURNING_RAD && left_rad.max(right_rad) > ONE_WAY * all_rad {
+    if !off && all_rad > MIN_TURNING_RAD && left_rad.max(right_rad) > ONE_WAY * all_rad {
         let kind = Kind::OneWayTurns { left: left_rad > right_rad };
         check.problems.push(Problem::new(&kind, Severity::Hint, None, 0.9));
     }
-}
-
-fn net(angles: &[f64]) -> f64 {
-    angles.last().zip(angles.first()).map_or(0.0, |(last, first)| last - first)
 }
 
 /// Partial measurements of runs that have displacements too.
@@ -68,19 +59,20 @@ pub(crate) struct Coverage {
     pub(crate) information: Information,
     /// Does nothing but partial measurements see the robot?
     pub(crate) partial: bool,
-    /// Do the wheels turn the robot more than they drive it?
-    turns: bool,
+    /// What was driven.
+    driven: Driven,
 }
 
 impl Coverage {
     pub(crate) fn of(sessions: &[SessionCheck]) -> Self {
         let mut information = [[0.0; 3]; 3];
-        let (mut distance, mut turn) = (0.0, 0.0);
+        let mut driven = Driven::default();
         for session in sessions {
-            add(&mut information, session, &mut distance, &mut turn);
+            add(&mut information, session);
+            session.runs.iter().for_each(|run| driven.add(run, session.robot.wheel_separation_m, session.m_per_rad()));
         }
         let partial = sessions.iter().flat_map(|session| &session.runs).all(RunLog::is_seen_in_part);
-        Self { information, partial, turns: turn > distance }
+        Self { information, partial, driven }
     }
 }
 
@@ -96,13 +88,18 @@ pub(crate) fn are_determined(information: &Information, partial: bool) -> [bool;
 
 /// Which parameters the sessions determine together; what they do not is a problem.
 pub(crate) fn determined(coverage: &Coverage, problems: &mut Vec<Problem>) -> BTreeMap<&'static str, bool> {
-    let Coverage { information, partial, turns } = coverage;
+    let Coverage { information, partial, driven } = coverage;
     let determined: BTreeMap<&'static str, bool> =
         PARAMETERS.into_iter().zip(are_determined(information, *partial)).collect();
     let missing: Vec<&'static str> = PARAMETERS.into_iter().filter(|name| !determined[name]).collect();
     let is_wrong = problems.iter().any(|problem| problem.severity == Severity::Error);
     if !missing.is_empty() && !is_wrong {
-        let kind = Kind::NotDetermined { parameters: missing, turns: *turns, partial: *partial };
+        let why = if *partial {
+            "the gyro, tapes, walls and returns leave it open; measure lengths (distance.csv), whole turns (revisit.csv) or headings (wall.csv), or state scale_sigma under [gyro]".to_owned()
+        } else {
+            format!("they {}; drive straights of some metres and turns both ways", driven.sentence())
+        };
+        let kind = Kind::NotDetermined { parameters: missing, why };
         problems.push(Problem::new(&kind, Severity::Warning, None, 0.95));
     }
     determined
@@ -162,7 +159,7 @@ pub(crate) fn gradients(travel_m: Wheels<f64>, turn_rad: f64, separation_m: f64)
     ]
 }
 
-fn add(information: &mut Information, session: &SessionCheck, distance: &mut f64, turn: &mut f64) {
+fn add(information: &mut Information, session: &SessionCheck) {
     let mut row = |gradient: [f64; 3], sigma: f64| add_row(information, gradient, sigma);
     let m_per_rad = session.m_per_rad();
     let separation_m = session.robot.wheel_separation_m;
@@ -176,28 +173,22 @@ fn add(information: &mut Information, session: &SessionCheck, distance: &mut f64
         let count = matched.pairs.len() as f64;
         left[0] = matched.explained.unexplained[1] * whole_m / count;
         left[1] = matched.explained.unexplained[0] * whole_rad / count;
-        let sigma = left.map(|left| 1.25 * 10.0_f64.sqrt() * left.max(1e-6));
+        // Not `max`, which takes a residual that is no number for the smallest.
+        let sigma = left.map(|left| 1.25 * 10.0_f64.sqrt() * left.clamp(1e-6, f64::INFINITY));
         for pair in &matched.pairs {
             let travel_m = pair.moved.zip_with(m_per_rad, |rad, m| rad * m);
             row([0.5 * travel_m.left, 0.5 * travel_m.right, 0.0], sigma[0]);
-            *distance += 0.5 * (travel_m.left + travel_m.right).abs();
             if let Some((turned, _)) = pair.turned {
                 let travel_m = turned.zip_with(m_per_rad, |rad, m| rad * m);
                 let turn_rad = (travel_m.right - travel_m.left) / separation_m;
                 row([-travel_m.left / separation_m, travel_m.right / separation_m, -turn_rad], sigma[1]);
-                *turn += separation_m * turn_rad.abs();
             }
         }
     }
-    let has_windows = session.matched.as_ref().is_some_and(|matched| matched.measured == Measured::Poses);
     let Ok(geometry) = session.robot.geometry() else { return };
     for run in &session.runs {
         add_ends(run, &geometry, &mut row);
         add_partial(run, session, &mut row);
-        if !has_windows {
-            let turned = run.turning().zip_with(m_per_rad, |rad, m| rad * m);
-            *distance += 0.5 * (turned.left + turned.right);
-        }
     }
 }
 
@@ -236,7 +227,12 @@ fn heading_range_rad(run: &RunLog, m_per_rad: Wheels<f64>, separation_m: f64) ->
 /// What a run's poses or positions tell, seen from the first.
 fn add_ends(run: &RunLog, geometry: &DriveGeometry, row: &mut impl FnMut([f64; 3], f64)) {
     let Some((first, last)) = run.truth.first().zip(run.truth.last()) else { return };
-    if last.t_s <= first.t_s {
+    // Windows skip numbers that are not finite. Poses without a window determine nothing.
+    let is_number = |sample: &TruthSample| {
+        let parts = [sample.t_s, sample.x_m - first.x_m, sample.y_m - first.y_m, sample.theta_rad().unwrap_or(0.0)];
+        parts.iter().map(|part| part * part).sum::<f64>().is_finite()
+    };
+    if !(last.t_s > first.t_s && run.truth.iter().all(is_number)) {
         return;
     }
     let count = INSTANTS.min(run.truth.len() - 1);

@@ -115,8 +115,13 @@ fn wheels_of(hypothesis: Hypothesis, turn: Wheels<f64>) -> Wheels<f64> {
 fn judged(check: &SessionCheck, steps: &[Step<'_>]) -> Vec<Problem> {
     let Ok(geometry) = check.robot.geometry() else { return Vec::new() };
     let costs = hypotheses().into_iter().filter_map(|hypothesis| {
-        let misses: Vec<f64> = steps.iter().filter_map(|step| miss(step, hypothesis, &geometry)).collect();
-        (!misses.is_empty()).then(|| (hypothesis, misses.iter().sum::<f64>() / misses.len() as f64))
+        // Of a spin, larger wheels and a smaller separation are one.
+        let is_of_size = hypothesis.wheels != 1.0;
+        let tells = |step: &&Step<'_>| !is_of_size || goes_somewhere(step, &geometry);
+        let misses: Vec<f64> =
+            steps.iter().filter(tells).filter_map(|step| miss(step, hypothesis, &geometry)).collect();
+        let are_enough = 2 * misses.len() > steps.len();
+        are_enough.then(|| (hypothesis, misses.iter().sum::<f64>() / misses.len() as f64))
     });
     decided(check, costs.collect(), steps.len())
 }
@@ -167,6 +172,12 @@ fn driven(
         turned_rad += increment.turn_rad;
     }
     Some((pose, driven_m, turned_rad))
+}
+
+/// Does the robot go somewhere in a step, by the instrument: farther than a spin about a wheel would take it?
+fn goes_somewhere(step: &Step<'_>, geometry: &DriveGeometry) -> bool {
+    let (from, to) = (step.from.1, step.to.1);
+    (to.x_m - from.x_m).hypot(to.y_m - from.y_m) > geometry.wheel_separation_m()
 }
 
 /// What a hypothesis misses of a step, from 0 to about 2: of the distance driven, and of half a turn.

@@ -7,7 +7,9 @@ use crate::kind::Kind;
 use crate::problem::{Problem, Severity, probability};
 use crate::run_log::RunLog;
 use crate::session_check::SessionCheck;
-use crate::settings::{DELAY_GAIN_SHARE, HALF_ROW_SHARE, MAX_WINDOWS, MIN_GAIN, MIN_WARNED_OFFSET_S};
+use crate::settings::{
+    DELAY_GAIN_SHARE, HALF_ROW_SHARE, MAX_NEAR_OFFSET_S, MAX_WINDOWS, MIN_GAIN, MIN_WARNED_OFFSET_S,
+};
 use crate::windows::windows;
 
 pub(crate) fn found(check: &mut SessionCheck, dataset: &Dataset) {
@@ -40,7 +42,7 @@ pub(crate) fn found(check: &mut SessionCheck, dataset: &Dataset) {
     // Rates of the instant, taken for those of the interval, make poses late by half a row and no more. Poses
     // that are late by something else gain by that half too; and the mean of two rows is less noisy where
     // stamps or rates are.
-    let Some(delayed) = interval.best_offset(false) else { return };
+    let Some(delayed) = interval.best_offset(Some(MAX_NEAR_OFFSET_S)) else { return };
     let half_row_s = 0.5 * mean_interval_s(&check.runs);
     let gained = delayed.explained.gain_over(&as_stamped);
     let is_half_row = (delayed.clock.offset_s - half_row_s).abs() < HALF_ROW_SHARE * half_row_s + 2.0 * delayed.sigma_s;

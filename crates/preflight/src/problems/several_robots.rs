@@ -19,7 +19,7 @@ pub(crate) fn found(sessions: &[SessionCheck]) -> Option<Problem> {
         .filter_map(|session| {
             let geometry = session.matched.as_ref()?.geometry?;
             // What is wrong with a session's wheels has been said of it.
-            let sound = geometry.m_per_rad.left * geometry.m_per_rad.right > 0.0;
+            let sound = geometry.m_per_rad.left * geometry.m_per_rad.right > 0.0 && !geometry.is_diluted;
             let geometry_m = [
                 2.0 * geometry.m_per_rad.left.abs(),
                 2.0 * geometry.m_per_rad.right.abs(),

@@ -1,4 +1,5 @@
-//! Times in milliseconds: of all tables, or of one. The checks that follow have seconds.
+//! Times in milliseconds, of all tables; or of one in milli-, micro- or nanoseconds. The checks that follow
+//! have seconds.
 
 use dataset::MAX_ROW_S;
 
@@ -6,29 +7,25 @@ use crate::kind::Kind;
 use crate::problem::{Problem, Severity};
 use crate::run_log::RunLog;
 use crate::session_check::SessionCheck;
-use crate::settings::{CLOCK_UNIT_RATIO, MIN_ROWS, MIN_SPEED_M_S};
+use crate::settings::{CLOCK_UNIT_RATIO, MIN_ROWS, MIN_SPEED_M_S, TIME_UNITS};
 
 pub(crate) fn found(check: &mut SessionCheck) {
     let mut ratios: Vec<f64> = check.runs.iter().filter_map(spans).collect();
     ratios.sort_by(f64::total_cmp);
     if let Some(ratio) = ratios.get(ratios.len() / 2) {
         let [low, high] = CLOCK_UNIT_RATIO;
-        let factor = if (low..=high).contains(ratio) {
-            Some(1e-3)
-        } else if (low..=high).contains(&ratio.recip()) {
-            Some(1e3)
-        } else {
-            None
-        };
-        if let Some(factor) = factor {
-            let kind = Kind::TruthTimeUnit { factor };
+        let unit_of = |ratio: f64| TIME_UNITS.iter().position(|unit| (low..=high).contains(&(ratio / unit)));
+        let of_truth = unit_of(*ratio).map(|unit| (unit, true));
+        if let Some((unit, of_truth)) = of_truth.or_else(|| unit_of(ratio.recip()).map(|unit| (unit, false))) {
+            let kind = Kind::TruthTimeUnit { unit, of_truth };
             check.problems.push(Problem::new(&kind, Severity::Error, None, 0.99));
+            let per_second = TIME_UNITS[unit];
             for run in &mut check.runs {
-                if factor < 1.0 {
-                    run.scale_truth_time(factor);
+                if of_truth {
+                    run.scale_truth_time(per_second.recip());
                 } else {
-                    run.scale_time(1e-3);
-                    run.scale_truth_time(1e3);
+                    run.scale_time(per_second.recip());
+                    run.scale_truth_time(per_second);
                 }
             }
         }

@@ -10,7 +10,7 @@ use crate::run_log::RunLog;
 use crate::session_check::SessionCheck;
 use crate::settings::{
     CERTAIN_SIGMAS, FACTOR_TOLERANCE, LENGTH_UNITS, MAX_SEPARATION_RATIO, MAX_WHEEL_RATIO, MIN_TURNING_RAD,
-    TICK_FACTORS,
+    TICK_FACTORS, UNIT_TOLERANCE,
 };
 
 /// Names of the units of [`LENGTH_UNITS`].
@@ -45,7 +45,9 @@ pub(crate) fn found(check: &mut SessionCheck) {
         let nominal = check.m_per_rad();
         let ratios = geometry.m_per_rad.map(f64::abs).zip_with(nominal, |found, nominal| found / nominal);
         let separation = geometry.separation_m.abs() / check.robot.wheel_separation_m;
-        kinds.extend(scale(check, ratios, Some(separation), geometry.sigma));
+        if !geometry.is_diluted {
+            kinds.extend(scale(check, ratios, Some(separation), geometry.sigma));
+        }
     } else if let Some(one) = matched.one_direction {
         let nominal = check.m_per_rad();
         // What the stated robot would do for a radian along this direction.
@@ -106,8 +108,14 @@ fn scale(check: &SessionCheck, wheels: Wheels<f64>, separation: Option<f64>, sig
         if separation.is_some_and(|separation| near(separation, mean))
             || (separation.is_none() && !(0.05..20.0).contains(&mean))
         {
-            let unit = LENGTH_UNITS.iter().position(|unit| near(mean, *unit));
-            let nominal_unit = LENGTH_UNITS.iter().position(|unit| near(mean, unit.recip()));
+            // Near feet, the last, lie km/h and radii.
+            let is_unit = |ratio: f64, number: usize| {
+                let off = ratio / LENGTH_UNITS[number];
+                if number + 1 == LENGTH_UNITS.len() { (off - 1.0).abs() < UNIT_TOLERANCE } else { near(off, 1.0) }
+            };
+            let units = 0..LENGTH_UNITS.len();
+            let unit = units.clone().find(|number| is_unit(mean, *number));
+            let nominal_unit = units.clone().find(|number| is_unit(mean.recip(), *number));
             return Some(Kind::LengthUnit {
                 ratio: unit
                     .map_or_else(|| nominal_unit.map_or(mean, |at| LENGTH_UNITS[at].recip()), |at| LENGTH_UNITS[at]),

@@ -1,8 +1,10 @@
 //! The page as a browser gets it.
 
 use super::*;
+use crate::bars::{Bar, Bars};
 use crate::chart::{Axis, Mark, Series};
 use crate::content_policy::hash;
+use crate::error_picture::{ModelErrors, RunErrors};
 use crate::path_picture::PathRun;
 use crate::report::{MadeBy, Section, Tile, Tone};
 use crate::role::Role;
@@ -51,6 +53,17 @@ fn a_report() -> Report {
         .with(Block::Code(text(), text()))
         .with(Block::Table(table))
         .with(Block::Path(path))
+        .with(Block::Errors(ErrorPicture {
+            title: text(),
+            caption: text(),
+            models: vec![(text(), Role::Nominal)],
+            runs: vec![RunErrors {
+                name: text(),
+                t_s: vec![0.0, 1.0],
+                distance_m: vec![0.0, 1.0],
+                models: vec![Some(ModelErrors { position_m: vec![0.0, 1.0], heading_rad: Vec::new() })],
+            }],
+        }))
         .with(Block::Charts(vec![a_chart(), a_chart()]))
         .with(Block::Sketches(sketches))
         .with(Block::Svg(text(), "<svg xmlns='http://www.w3.org/2000/svg'/>".to_owned()));
@@ -61,6 +74,11 @@ fn a_report() -> Report {
         tone: Tone::Found,
         headline: text(),
         lead: text(),
+        bars: Some(Bars {
+            title: text(),
+            bars: vec![Bar { name: text(), role: Role::Nominal, value: 1.0, interval: Some((0.5, 2.0)), text: text() }],
+            note: text(),
+        }),
         tiles: vec![Tile { label: text(), value: text(), note: text(), section: "all".to_owned() }],
         sections: vec![section],
         appendix: vec![appendix],
@@ -86,7 +104,7 @@ fn nothing_that_a_user_wrote_leaves_its_place() {
     let scripts = elements(&page, "script");
     let data: Vec<_> = scripts.iter().filter(|(tag, _)| tag.contains("application/json")).collect();
     // One path, three charts; and the scripts of the page.
-    assert_eq!((data.len(), scripts.len()), (4, 4 + SCRIPTS.len()));
+    assert_eq!((data.len(), scripts.len()), (5, 5 + SCRIPTS.len()));
     // Quotes, which end attributes, are there in data alone.
     let without_data = data.iter().fold(page.clone(), |page, (_, text)| page.replace(text, ""));
     assert!(page.contains("onerror='x'") && !without_data.contains("onerror='x'"));
@@ -121,15 +139,16 @@ fn every_picture_has_a_title_a_description_and_its_numbers() {
     let page = a_report().render().expect("a page");
     let figures = elements(&page, "figure");
     let pictures: Vec<_> = figures.iter().filter(|(tag, _)| tag.contains("picture")).collect();
-    assert_eq!(pictures.len(), 4);
+    assert_eq!(pictures.len(), 5);
     for (_, picture) in pictures {
         for part in ["<h3>", "role=\"img\"", "aria-label=\"", "<details", "<table", "<caption>"] {
             assert!(picture.contains(part), "no {part}");
         }
     }
     let drawings = elements(&page, "svg");
-    assert_eq!(drawings.len(), 2);
-    for (tag, drawing) in drawings {
+    assert_eq!(drawings.len(), 3);
+    // The bars of the first screen are cells of a table that has their numbers.
+    for (tag, drawing) in drawings.into_iter().filter(|(tag, _)| !tag.contains("aria-hidden")) {
         assert!(tag.contains("role=\"img\"") && drawing.contains("<title>") && drawing.contains("<desc>"));
     }
     assert!(elements(&page, "figure").iter().any(|(_, figure)| figure.contains("<img alt=\"")));

@@ -201,6 +201,16 @@ mod tests {
         assert!((error.abs() - 3.3e-4).abs() < 1e-5, "{error}");
     }
 
+    /// Of radii with variances l and r and a base that moves by a and b with them: 4l, 4r, 2al, 2br, and the
+    /// base's own variance with a²l + b²r.
+    #[test]
+    fn the_base_inherits_the_errors_of_both_radii() {
+        let found = covariance(Some(1.0), Some(4.0), Some(10.0), Wheels { left: -2.0, right: 3.0 });
+        let expected = [[4.0, 0.0, -4.0], [0.0, 16.0, 24.0], [-4.0, 24.0, 50.0]];
+        assert_eq!(found, Some(Covariance::from_fn(3, 3, |row, column| expected[row][column])));
+        assert_eq!(covariance(Some(1.0), None, Some(10.0), Wheels::both(1.0)), None);
+    }
+
     #[test]
     fn paper_eq_8_and_14_do_not_fold_and_hold_both_ways_round() {
         for turn_rad in [2.0, -2.0, 6.49, -6.49, 12.6] {

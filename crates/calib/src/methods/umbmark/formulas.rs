@@ -56,7 +56,7 @@ pub(super) fn calibration(
         covariance,
         not_observable: vec![NotObservable {
             parameter: Parameter::CommonScale,
-            why: "a closed square hides the scale common to both wheels, and reads it as a wrong wheelbase; measure a straight run of known length first",
+            why: "a closed square hides the scale common to both wheels, and reads it as a wrong wheelbase; measure a straight run of known length first".into(),
         }],
         runs_used: cw.x_m.count + ccw.x_m.count,
         ..Calibration::new(NAME, drive(NAME, diameter_m, separation_m)?, robot.ticks_per_rev)

@@ -2,12 +2,14 @@
 
 use kinematics::Wheels;
 
+use super::drive::{Drive, WheelUnits};
 use super::options::Rates;
 use super::runs::{Part, RawRun};
 use super::times::seconds;
-use super::units::{Drive, Units, WheelUnits};
+use super::units::Units;
 use crate::column_names::Quantity;
 use crate::error::DatasetError;
+use crate::partial::GyroSample;
 use crate::record::{Odometry, Run, RunInfo, TruthSample, WheelLog};
 use crate::unit::Unit;
 
@@ -25,6 +27,18 @@ pub(super) fn run(
     let part = &parts[raw.part];
     let t_s: Vec<f64> = raw.rows.iter().map(|&row| seconds(raw.start, part.log.time[row])).collect();
     let wheels = match (units.wheels, &part.log.wheels) {
+        (WheelUnits::Wheels(Unit::TicksPerRow), Some([left, right])) => WheelLog::Ticks(Wheels {
+            left: sums(counts(part, Quantity::Left, raw, left)?, i64::wrapping_add),
+            right: sums(counts(part, Quantity::Right, raw, right)?, i64::wrapping_add),
+        }),
+        (WheelUnits::Wheels(unit @ (Unit::RadPerRow | Unit::MPerRow)), Some([left, right])) => {
+            let m_per_rad = drive.geometry.m_per_rad();
+            let angle = |column: &[f64], m_per_rad: f64| {
+                let scale = if unit == Unit::MPerRow { 1.0 / m_per_rad } else { 1.0 };
+                sums(raw.rows.iter().map(|&row| column[row] * scale).collect(), |sum, step| sum + step)
+            };
+            WheelLog::Angles(Wheels { left: angle(left, m_per_rad.left), right: angle(right, m_per_rad.right) })
+        }
         (WheelUnits::Wheels(Unit::Ticks), Some([left, right])) => WheelLog::Ticks(Wheels {
             left: counts(part, Quantity::Left, raw, left)?,
             right: counts(part, Quantity::Right, raw, right)?,
@@ -64,12 +78,34 @@ pub(super) fn run(
         for &row in &raw.truth_rows {
             let theta_rad = Some(units.angle.to_si(pose.theta[row])).filter(|theta_rad| theta_rad.is_finite());
             let (x_m, y_m) = (units.length.to_si(pose.x[row]), units.length.to_si(pose.y[row]));
-            truth.push(TruthSample::new(seconds(raw.start, truth_part.log.time[row]), x_m, y_m, theta_rad));
+            truth.push(TruthSample::new(
+                seconds(raw.start, truth_part.log.time[row] + truth_part.shift_ps),
+                x_m,
+                y_m,
+                theta_rad,
+            ));
         }
+    }
+    let mut gyro = Vec::new();
+    if let (Some((unit, _)), Some((part, rows))) = (&units.gyro, &raw.gyro)
+        && let Some(rates) = &parts[*part].log.gyro
+    {
+        let part = &parts[*part];
+        let sample = |&row: &usize| GyroSample {
+            t_s: seconds(raw.start, part.log.time[row]),
+            omega_radps: unit.to_si(rates[row]),
+        };
+        gyro.extend(rows.iter().map(sample));
     }
     let start_s = session_start.map(|session| seconds(session, raw.start));
     let info = RunInfo { id: raw.id.clone(), start_s, ..RunInfo::default() };
-    Ok(Run { info, odometry: Odometry { t_s: t_s.into(), wheels, ..Odometry::default() }, truth, ..Run::default() })
+    Ok(Run {
+        info,
+        odometry: Odometry { t_s: t_s.into(), wheels, ..Odometry::default() },
+        truth,
+        gyro,
+        ..Run::default()
+    })
 }
 
 fn counts(part: &Part, side: Quantity, raw: &RawRun, column: &[f64]) -> Result<Vec<i64>, DatasetError> {
@@ -83,6 +119,18 @@ fn counts(part: &Part, side: Quantity, raw: &RawRun, column: &[f64]) -> Result<V
         Err(DatasetError::NotACount { file, line, column, found: value.to_string() })
     };
     raw.rows.iter().map(count).collect()
+}
+
+/// Sums of what was moved row by row, from nothing at the first row.
+fn sums<T: Copy + Default>(steps: Vec<T>, add: impl Fn(T, T) -> T) -> Vec<T> {
+    let mut sum = T::default();
+    let sum_at = |(index, step): (usize, T)| {
+        if index > 0 {
+            sum = add(sum, step);
+        }
+        sum
+    };
+    steps.into_iter().enumerate().map(sum_at).collect()
 }
 
 /// Means over the intervals that end at each row.

@@ -1,15 +1,13 @@
 //! Which column of a sheet is what, and what its cells say.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
-use super::options::{MapEntry, Options};
+use super::options::{FileRole, MapEntry, Options};
 use super::sheet::Sheet;
 use super::took::{Basis, Confidence};
 use crate::column_names::{NameReading, Quantity, read_name};
 use crate::error::{DatasetError, shown};
-use crate::name_units::unreadable_unit;
-use crate::quaternion::Quaternion;
-use crate::read::why_no_id;
+use crate::name_units::{tokens_of, unreadable_unit};
 use crate::unit::Unit;
 
 /// The column that was taken for a quantity.
@@ -22,6 +20,10 @@ pub(super) struct Chosen {
     pub(super) unit_basis: Basis,
     pub(super) is_rate: bool,
     pub(super) is_counted: bool,
+    /// The name says that the wheel is an angle.
+    pub(super) is_angle: bool,
+    /// An outside instrument's by name.
+    pub(super) is_outside: bool,
 }
 
 /// The columns of one sheet.
@@ -29,6 +31,8 @@ pub(super) struct Chosen {
 pub(super) struct Roles {
     pub(super) of: BTreeMap<Quantity, Chosen>,
     pub(super) left_out: Vec<String>,
+    /// What a user should read of the choice.
+    pub(super) remarks: Vec<String>,
 }
 
 impl Roles {
@@ -42,6 +46,16 @@ impl Roles {
 
     pub(super) fn has_pose(&self) -> bool {
         self.has(Quantity::X)
+    }
+
+    pub(super) fn has_gyro(&self) -> bool {
+        self.has(Quantity::Gyro)
+    }
+
+    /// Leaves quantities out, so that they are listed among what was.
+    pub(super) fn leave_out(&mut self, sheet: &Sheet, is_meant: impl Fn(Quantity) -> bool) {
+        let left_out = self.of.extract_if(.., |quantity, _| is_meant(*quantity));
+        self.left_out.extend(left_out.map(|(_, chosen)| sheet.names[chosen.index].clone()));
     }
 
     /// The two columns that say how the wheels moved.
@@ -61,19 +75,24 @@ fn mapped(sheet: &Sheet, column: &str) -> Option<usize> {
 }
 
 /// Refuses what `--map` names and no sheet has.
-pub(super) fn refuse_unknown_columns(sheets: &[Sheet], options: &Options) -> Result<(), DatasetError> {
-    let runs_by = options.runs_by.iter().map(|column| (column, "--runs-by"));
-    let columns = options.map.iter().map(|entry| (&entry.column, "--map")).chain(runs_by);
-    for (column, flag) in columns {
-        if sheets.iter().all(|sheet| mapped(sheet, column).is_none()) {
-            let names: Vec<String> =
-                sheets.iter().map(|sheet| format!("{} has {}", sheet.file.display(), listed(&sheet.names))).collect();
-            let message = format!("{flag}: no column \"{}\"; {}", shown(column.as_bytes()), names.join("; "));
-            return Err(DatasetError::Foreign {
-                file: sheets[0].file.clone(),
-                line: sheets[0].header_line.unwrap_or(1),
-                message,
-            });
+pub(super) fn refuse_unknown_columns(sheets: &[(Sheet, FileRole)], options: &Options) -> Result<(), DatasetError> {
+    let runs_by = options.runs_by.iter().map(|column| (FileRole::Any, column, "--runs-by"));
+    let columns = options.map.iter().map(|entry| (entry.role, &entry.column, "--map")).chain(runs_by);
+    let refused = |message: String| {
+        let first = &sheets[0].0;
+        Err(DatasetError::Foreign { file: first.file.clone(), line: first.header_line.unwrap_or(1), message })
+    };
+    for (of, column, flag) in columns {
+        let meant: Vec<&Sheet> =
+            sheets.iter().filter(|(_, role)| of == FileRole::Any || of == *role).map(|(sheet, _)| sheet).collect();
+        if meant.is_empty() {
+            let prefix = of.prefix();
+            return refused(format!("--map {prefix}: holds for the files of --{prefix}; say --{prefix} FILE"));
+        }
+        if meant.iter().all(|sheet| mapped(sheet, column).is_none()) {
+            let has = |sheet: &&Sheet| format!("{} has {}", sheet.file.display(), listed(&sheet.names));
+            let names: Vec<String> = meant.iter().map(has).collect();
+            return refused(format!("{flag}: no column \"{}\"; {}", shown(column.as_bytes()), names.join("; ")));
         }
     }
     Ok(())
@@ -90,20 +109,24 @@ pub(super) fn listed(names: &[String]) -> String {
 }
 
 /// Decides what the columns of a sheet are: by the user's word, else by their names.
-pub(super) fn roles(sheet: &Sheet, options: &Options) -> Result<Roles, DatasetError> {
+pub(super) fn roles(sheet: &Sheet, role: FileRole, options: &Options) -> Result<Roles, DatasetError> {
     let mut roles = Roles::default();
     let mut given: Vec<(Quantity, usize, Option<Unit>)> = Vec::new();
-    for MapEntry { quantity, column, unit } in &options.map {
-        given.extend(mapped(sheet, column).map(|index| (*quantity, index, *unit)));
+    for MapEntry { role: of, quantity, column, unit } in &options.map {
+        if role.reads(*quantity) && (*of == FileRole::Any || *of == role) {
+            given.extend(mapped(sheet, column).map(|index| (*quantity, index, *unit)));
+        }
     }
     if let Some(index) = options.runs_by.as_ref().and_then(|column| mapped(sheet, column)) {
         given.push((Quantity::Run, index, None));
     }
     if sheet.header_line.is_none() && given.is_empty() {
-        return Err(without_header(sheet));
+        return Err(without_header(sheet, role));
     }
+    let joints = joint_names(sheet)?;
     let reading = |index: usize| -> Option<NameReading> {
-        let mut reading = sheet.header_line.and_then(|_| read_name(&sheet.names[index]))?;
+        let name = joints.get(&index).unwrap_or(&sheet.names[index]);
+        let mut reading = sheet.header_line.and_then(|_| read_name(name))?;
         let units = [reading.unit, sheet.units[index]].into_iter().flatten();
         reading.unit = units.into_iter().find(|unit| reading.quantity.accepts(*unit));
         Some(reading)
@@ -117,21 +140,39 @@ pub(super) fn roles(sheet: &Sheet, options: &Options) -> Result<Roles, DatasetEr
             (None, None) => (None, Basis::new(Confidence::Given, "--map")),
         };
         let (is_rate, is_counted) = named.map_or((false, false), |named| (named.is_rate, named.is_counted));
+        let is_angle = named.is_some_and(|named| named.is_angle);
         let basis = Basis::new(Confidence::Given, "--map");
-        roles.of.insert(quantity, Chosen { index, unit, basis, unit_basis, is_rate, is_counted });
+        // What the user names is meant for what it is named.
+        roles.of.insert(
+            quantity,
+            Chosen { index, unit, basis, unit_basis, is_rate, is_counted, is_angle, is_outside: true },
+        );
     }
     let mut by_name: BTreeMap<Quantity, Vec<(usize, NameReading)>> = BTreeMap::new();
     for index in (0..sheet.names.len()).filter(|index| given.iter().all(|(_, taken, _)| taken != index)) {
         match reading(index) {
-            Some(reading) if !reading.is_own && !roles.has(reading.quantity) => {
+            Some(reading) if !reading.is_own && role.reads(reading.quantity) && !roles.has(reading.quantity) => {
                 by_name.entry(reading.quantity).or_default().push((index, reading));
             }
             _ => roles.left_out.push(sheet.names[index].clone()),
         }
     }
+    if let Some(stamps) = by_name.get_mut(&Quantity::Time)
+        && let Some((seconds, nanos)) = seconds_and_nanoseconds(sheet, stamps)
+    {
+        let taken = stamps.extract_if(.., |(index, _)| *index == nanos).next();
+        let best = stamps.iter().map(|(_, reading)| reading.rank).max().unwrap_or(0);
+        let is_best = |of: &(usize, NameReading)| of.0 == seconds && of.1.rank == best;
+        if stamps.iter().any(is_best) {
+            by_name.entry(Quantity::Nanoseconds).or_default().extend(taken);
+        } else {
+            roles.left_out.push(sheet.names[nanos].clone());
+        }
+    }
     // A wheel is logged in one form: the one that both columns have.
     let rank_of = |quantity| by_name.get(&quantity).and_then(|all| all.iter().map(|(_, reading)| reading.rank).max());
     let wheel_rank = rank_of(Quantity::Left).zip(rank_of(Quantity::Right)).map(|(left, right)| left.min(right));
+    let mut undecided: BTreeMap<Quantity, DatasetError> = BTreeMap::new();
     for (quantity, candidates) in by_name {
         let is_wheel = matches!(quantity, Quantity::Left | Quantity::Right);
         let best = candidates.iter().map(|(_, reading)| reading.rank).max().unwrap_or(0);
@@ -140,57 +181,156 @@ pub(super) fn roles(sheet: &Sheet, options: &Options) -> Result<Roles, DatasetEr
         roles.left_out.extend(others.into_iter().map(|(index, _)| sheet.names[index].clone()));
         if let [first, second, ..] = &chosen[..] {
             let [first, second] = [first.0, second.0].map(|index| shown(sheet.names[index].as_bytes()));
-            return Err(DatasetError::Undecided {
-                file: sheet.file.clone(),
-                what: format!("column {}", quantity.key()),
-                flag: format!("--map {}={first} or --map {}={second}", quantity.key(), quantity.key()),
-                readings: format!("{first} or {second}"),
-            });
+            undecided.insert(
+                quantity,
+                DatasetError::Undecided {
+                    file: sheet.file.clone(),
+                    what: format!("column {}", quantity.key()),
+                    flag: format!("--map {}={first} or --map {}={second}", quantity.key(), quantity.key()),
+                    readings: format!("{first} or {second}"),
+                },
+            );
+            roles.left_out.extend(chosen.into_iter().map(|(index, _)| sheet.names[index].clone()));
+            continue;
         }
-        if let Some(&(index, NameReading { unit, is_rate, is_counted, .. })) = chosen.first() {
+        if let Some(&(index, NameReading { unit, is_rate, is_counted, is_angle, is_outside, .. })) = chosen.first() {
             let basis = Basis::new(Confidence::Likely, "name");
             let unit_basis = Basis::new(Confidence::Certain, "name");
-            roles.of.insert(quantity, Chosen { index, unit, basis, unit_basis, is_rate, is_counted });
+            roles
+                .of
+                .insert(quantity, Chosen { index, unit, basis, unit_basis, is_rate, is_counted, is_angle, is_outside });
         }
     }
-    settle(sheet, roles)
+    if let Some((_, error)) = undecided.into_iter().find(|(quantity, _)| is_needed(*quantity, &roles)) {
+        return Err(error);
+    }
+    settle(sheet, role, roles)
+}
+
+/// Columns of arrays as tables of `JointState` have them: `position[1]` is called by what `name[1]` holds in
+/// all rows.
+fn joint_names(sheet: &Sheet) -> Result<BTreeMap<usize, String>, DatasetError> {
+    let indexed = |name: &str| {
+        let (stem, number) = name.strip_suffix(']')?.rsplit_once('[')?;
+        let (path, field) = stem.rsplit_once(['.', '/']).unwrap_or(("", stem));
+        Some((path.to_owned(), field.to_owned(), number.parse::<usize>().ok()?))
+    };
+    let columns: Vec<_> = sheet.names.iter().map(|name| indexed(name)).collect();
+    let mut names: BTreeMap<(String, usize), (usize, Option<String>)> = BTreeMap::new();
+    for (index, column) in columns.iter().enumerate() {
+        if let Some((path, _, number)) = column.as_ref().filter(|(_, field, _)| field == "name") {
+            names.insert((path.clone(), *number), (index, None));
+        }
+    }
+    if names.is_empty() {
+        return Ok(BTreeMap::new());
+    }
+    let mut is_first = true;
+    sheet.for_each_row(|_, fields| {
+        for (index, name) in names.values_mut() {
+            if is_first {
+                *name = Some(fields[*index].to_owned());
+            } else if name.as_deref() != Some(fields[*index]) {
+                *name = None;
+            }
+        }
+        is_first = false;
+        Ok(())
+    })?;
+    let named = columns.into_iter().enumerate().filter_map(|(index, column)| {
+        let (path, field, number) = column?;
+        let name = names.get(&(path, number))?.1.as_ref().filter(|_| field != "name")?;
+        Some((index, format!("{name} {field}")))
+    });
+    Ok(named.collect())
+}
+
+/// Whether a quantity that two columns may be must be known beside those that are.
+fn is_needed(quantity: Quantity, roles: &Roles) -> bool {
+    use Quantity::{Gyro, Heading, Left, Qw, Qx, Qy, Qz, Right, Speed, X, Y, YawRate};
+    let all = |of: &[Quantity]| of.iter().all(|quantity| roles.has(*quantity));
+    match quantity {
+        Speed | YawRate => !all(&[Left, Right]),
+        Left | Right => !all(&[Speed, YawRate]),
+        Heading => !all(&[Qx, Qy, Qz, Qw]),
+        Qx | Qy | Qz | Qw => !roles.has(Heading) && all(&[X, Y]),
+        // Two gyroscopes beside poses: an instrument more, which a user may name.
+        Gyro => !all(&[X, Y]),
+        _ => true,
+    }
+}
+
+/// Of columns of time the two that are whole seconds and the nanoseconds beside them, as messages of ROS are
+/// written field by field: `sec`, `nanosec`.
+fn seconds_and_nanoseconds(sheet: &Sheet, stamps: &[(usize, NameReading)]) -> Option<(usize, usize)> {
+    const SECONDS: [&str; 4] = ["s", "sec", "secs", "seconds"];
+    const NANOSECONDS: [&str; 7] = ["ns", "nsec", "nsecs", "nanosec", "nanosecs", "nanos", "nanoseconds"];
+    let stem = |index: usize, last_words: &[&str]| {
+        let mut words = tokens_of(&sheet.names[index]);
+        let last = words.pop()?;
+        last_words.contains(&last.as_str()).then_some(words)
+    };
+    let whole = |text: &str| sheet.decimal.number(text).filter(|value| value.fract() == 0.0);
+    let pairs = stamps.iter().flat_map(|(seconds, _)| stamps.iter().map(move |(nanos, _)| (*seconds, *nanos)));
+    let mut pairs = pairs.filter(|(seconds, nanos)| {
+        stem(*seconds, &SECONDS).is_some_and(|words| stem(*nanos, &NANOSECONDS) == Some(words))
+    });
+    pairs.find(|&(seconds, nanos)| {
+        let mut is_joined = true;
+        // A row of another length is refused where rows are read.
+        let _ = sheet.for_each_row(|_, fields| {
+            is_joined &= whole(fields[seconds]).is_some();
+            is_joined &= whole(fields[nanos]).is_some_and(|value| (0.0..1e9).contains(&value));
+            Ok(())
+        });
+        is_joined
+    })
 }
 
 /// Leaves out what is said twice, and refuses what is said by half.
-fn settle(sheet: &Sheet, mut roles: Roles) -> Result<Roles, DatasetError> {
-    use Quantity::{Heading, Left, Qw, Qx, Qy, Qz, Right, Speed, Time, X, Y, YawRate};
-    let leave_out = |roles: &mut Roles, quantities: &[Quantity]| {
-        for quantity in quantities {
-            if let Some(chosen) = roles.of.remove(quantity) {
-                roles.left_out.push(sheet.names[chosen.index].clone());
-            }
-        }
-    };
+fn settle(sheet: &Sheet, role: FileRole, mut roles: Roles) -> Result<Roles, DatasetError> {
+    use Quantity::{Gyro, Heading, Left, Qw, Qx, Qy, Qz, Right, Speed, Time, X, Y, YawRate};
     if roles.has(Left) && roles.has(Right) {
-        leave_out(&mut roles, &[Speed, YawRate]);
+        take_yaw_rate_for_gyro(sheet, &mut roles);
+        roles.leave_out(sheet, |of| matches!(of, Speed | YawRate));
     }
     let quaternion = [Qx, Qy, Qz, Qw].iter().all(|part| roles.has(*part));
     // A heading alone, without a position, is no pose; a position without a whole quaternion has none.
     if roles.has(Heading) || !quaternion || !roles.has(X) {
-        leave_out(&mut roles, &[Qx, Qy, Qz, Qw]);
+        roles.leave_out(sheet, |of| matches!(of, Qx | Qy | Qz | Qw));
     }
     if !roles.has(X) && !roles.has(Y) {
-        leave_out(&mut roles, &[Heading]);
+        roles.leave_out(sheet, |of| of == Heading);
     }
     let pairs = [(Left, Right), (Right, Left), (X, Y), (Y, X), (Speed, YawRate), (YawRate, Speed)];
     for (there, missing) in pairs {
         if roles.has(there) && !roles.has(missing) {
             // A speed beside poses is the instrument's; so is a yaw rate.
-            if matches!(there, Speed | YawRate) && roles.has_pose() {
-                leave_out(&mut roles, &[there]);
+            if matches!(there, Speed | YawRate) && (roles.has_pose() || roles.has_gyro()) {
+                roles.leave_out(sheet, |of| of == there);
                 continue;
             }
             let name = &sheet.names[roles.of[&there].index];
             return Err(lacking(sheet, missing.key(), &format!("\"{}\" is {}", shown(name.as_bytes()), there.key())));
         }
     }
-    if !roles.has_wheels() && !roles.has_pose() {
-        return Err(lacking(sheet, "left, right, or x, y", "it has neither wheels nor poses"));
+    match role {
+        FileRole::Wheels if !roles.has_wheels() && !roles.has_gyro() => {
+            let message = format!(
+                "no columns of wheels, left and right or v and omega; the columns are: {}; say which with --map left=COLUMN,right=COLUMN",
+                listed(&sheet.names)
+            );
+            return Err(DatasetError::Foreign {
+                file: sheet.file.clone(),
+                line: sheet.header_line.unwrap_or(1),
+                message,
+            });
+        }
+        FileRole::Truth if !roles.has_pose() => return Err(lacking(sheet, "x, y", "--truth: it has no poses")),
+        _ if !roles.has_wheels() && !roles.has_pose() && !roles.has(Gyro) => {
+            return Err(lacking(sheet, "left, right, or x, y", "it has neither wheels nor poses"));
+        }
+        _ => {}
     }
     if !roles.has(Time) {
         return Err(lacking(sheet, "t", "every row needs its time"));
@@ -215,6 +355,31 @@ fn settle(sheet: &Sheet, mut roles: Roles) -> Result<Roles, DatasetError> {
     Ok(roles)
 }
 
+/// Beside both wheels and without a speed, an Imu's usual names of a yaw rate are a gyroscope's.
+fn take_yaw_rate_for_gyro(sheet: &Sheet, roles: &mut Roles) {
+    let usual: [&[&str]; 2] = [&["wz"], &["angular", "velocity", "z"]];
+    let is_usual = |name: &str| {
+        let words = tokens_of(name);
+        usual.iter().any(|usual| {
+            words.iter().rev().map(String::as_str).zip(usual.iter().rev()).all(|(a, b)| a == *b)
+                && words.len() >= usual.len()
+        })
+    };
+    let is_alone = !roles.has(Quantity::Speed) && !roles.has(Quantity::Gyro);
+    let named = roles.of.get(&Quantity::YawRate).filter(|chosen| chosen.basis.confidence != Confidence::Given);
+    let Some(name) = named.map(|chosen| sheet.names[chosen.index].clone()).filter(|name| is_alone && is_usual(name))
+    else {
+        return;
+    };
+    if let Some(chosen) = roles.of.remove(&Quantity::YawRate) {
+        roles.of.insert(Quantity::Gyro, chosen);
+        roles.remarks.push(format!(
+            "{}: column {name} is taken as a gyroscope's yaw rate; if it is computed from the wheels, say --map omega={name}",
+            sheet.file.display()
+        ));
+    }
+}
+
 fn lacking(sheet: &Sheet, missing: &str, why: &str) -> DatasetError {
     let example = missing.split(", ").next().unwrap_or(missing);
     DatasetError::Foreign {
@@ -227,9 +392,15 @@ fn lacking(sheet: &Sheet, missing: &str, why: &str) -> DatasetError {
     }
 }
 
-fn without_header(sheet: &Sheet) -> DatasetError {
+fn without_header(sheet: &Sheet, role: FileRole) -> DatasetError {
     let first = sheet.text.lines().nth(sheet.first_row as usize - 1).unwrap_or_default();
-    let usual = ["t=1", "left=2", "right=3", "x=4", "y=5", "theta=6"];
+    let usual = match role {
+        FileRole::Any => ["t=1", "left=2", "right=3", "x=4", "y=5", "theta=6"],
+        FileRole::Wheels => ["wheels:t=1", "left=2", "right=3", "", "", ""],
+        FileRole::Truth => ["truth:t=1", "x=2", "y=3", "theta=4", "", ""],
+    };
+    let usual: Vec<&str> = usual.into_iter().filter(|entry| !entry.is_empty()).collect();
+    let most = usual.len();
     DatasetError::Foreign {
         file: sheet.file.clone(),
         line: sheet.first_row,
@@ -237,121 +408,17 @@ fn without_header(sheet: &Sheet) -> DatasetError {
             "no header says what the {} columns are; the first row is {}; say it by the columns' numbers, like --map {}",
             sheet.names.len(),
             shown(first.as_bytes()),
-            usual[..sheet.names.len().clamp(3, 6)].join(",")
+            usual[..sheet.names.len().clamp(3, most)].join(",")
         ),
     }
 }
 
-/// The cells of a sheet that are needed.
-#[derive(Debug)]
-pub(super) struct Log {
-    /// Line of each row, from 1.
-    pub(super) lines: Vec<u64>,
-    /// In units of 10⁻¹² of the column's; of picoseconds once the unit is known.
-    pub(super) time: Vec<i128>,
-    /// Which of `run_names` each row belongs to.
-    pub(super) run: Vec<u32>,
-    pub(super) run_names: Vec<String>,
-    /// Both wheels, or speed and yaw rate; NaN where a cell is empty.
-    pub(super) wheels: Option<[Vec<f64>; 2]>,
-    /// NaN where a cell is empty or NaN.
-    pub(super) pose: Option<PoseColumns>,
-}
-
-/// Positions and headings as they are written.
-#[derive(Debug, Default)]
-pub(super) struct PoseColumns {
-    pub(super) x: Vec<f64>,
-    pub(super) y: Vec<f64>,
-    /// NaN where there is none.
-    pub(super) theta: Vec<f64>,
-}
-
-impl Log {
-    pub(super) fn read(sheet: &Sheet, roles: &Roles) -> Result<Self, DatasetError> {
-        let index = |quantity: Quantity| roles.of.get(&quantity).map(|chosen| chosen.index);
-        let (time, run) = (index(Quantity::Time).unwrap_or(0), index(Quantity::Run));
-        let wheels = roles.wheels().map(|pair| pair.map(|quantity| roles.of[&quantity].index));
-        let position = index(Quantity::X).zip(index(Quantity::Y));
-        let heading = index(Quantity::Heading);
-        let quaternion = [Quantity::Qx, Quantity::Qy, Quantity::Qz, Quantity::Qw].map(index);
-        let mut log = Self {
-            lines: Vec::new(),
-            time: Vec::new(),
-            run: Vec::new(),
-            run_names: Vec::new(),
-            wheels: wheels.map(|_| Default::default()),
-            pose: position.map(|_| PoseColumns::default()),
-        };
-        let mut known: HashMap<&str, u32> = HashMap::new();
-        sheet.for_each_row(|line, fields| {
-            let fault = |column: usize, found: Option<f64>| {
-                let (file, found_text) = (sheet.file.clone(), shown(fields[column].as_bytes()));
-                let column = sheet.names[column].clone();
-                if found.is_some() {
-                    DatasetError::NotFinite { file, line, column, found: found_text }
-                } else {
-                    DatasetError::NotANumber { file, line, column, found: found_text }
-                }
-            };
-            let number = |column: usize| match fields[column] {
-                "" => Ok(f64::NAN),
-                text => sheet.decimal.number(text).ok_or_else(|| fault(column, None)),
-            };
-            let stamp =
-                sheet.decimal.exact(fields[time]).ok_or_else(|| fault(time, sheet.decimal.number(fields[time])))?;
-            log.lines.push(line);
-            log.time.push(stamp);
-            if let Some(run) = run {
-                let next = known.len() as u32;
-                log.run.push(*known.entry(fields[run]).or_insert(next));
-                if known.len() > log.run_names.len() {
-                    if let Some(expected) = why_no_id(fields[run]) {
-                        let (file, id) = (sheet.file.clone(), shown(fields[run].as_bytes()));
-                        return Err(DatasetError::BadId { file, line, id, expected });
-                    }
-                    log.run_names.push(fields[run].to_owned());
-                }
-            }
-            if let (Some(columns), Some(wheels)) = (wheels, &mut log.wheels) {
-                for (column, values) in columns.into_iter().zip(wheels) {
-                    let value = number(column)?;
-                    if !value.is_finite() && !fields[column].is_empty() {
-                        return Err(fault(column, Some(value)));
-                    }
-                    values.push(value);
-                }
-            }
-            if let (Some((x, y)), Some(pose)) = (position, &mut log.pose) {
-                pose.x.push(number(x)?);
-                pose.y.push(number(y)?);
-                let theta = match (heading, quaternion) {
-                    (Some(heading), _) => number(heading)?,
-                    (None, [Some(x), Some(y), Some(z), Some(w)]) => {
-                        let parts = [number(x)?, number(y)?, number(z)?, number(w)?];
-                        Quaternion::new(parts).map_or(f64::NAN, Quaternion::yaw_rad)
-                    }
-                    _ => f64::NAN,
-                };
-                pose.theta.push(theta);
-            }
-            Ok(())
-        })?;
-        Ok(log)
-    }
-
-    /// Which run a row belongs to.
-    pub(super) fn run_of(&self, row: usize) -> u32 {
-        self.run.get(row).copied().unwrap_or(0)
-    }
-
-    /// Whether a row says something of the wheels.
-    pub(super) fn has_wheels_at(&self, row: usize) -> bool {
-        self.wheels.as_ref().is_some_and(|wheels| wheels.iter().all(|values| !values[row].is_nan()))
-    }
-
-    /// Whether a row says where the robot stood.
-    pub(super) fn has_pose_at(&self, row: usize) -> bool {
-        self.pose.as_ref().is_some_and(|pose| pose.x[row].is_finite() && pose.y[row].is_finite())
+/// A unit that is said or named, or all that it may be.
+pub(super) fn known_or(chosen: &Chosen, flag: Option<Unit>, name: &str, all: &[Unit]) -> (Vec<Unit>, Basis) {
+    match (chosen.unit, flag) {
+        (Some(unit), _) if chosen.unit_basis.confidence == Confidence::Given => (vec![unit], chosen.unit_basis.clone()),
+        (_, Some(unit)) => (vec![unit], Basis::new(Confidence::Given, name)),
+        (Some(unit), None) => (vec![unit], chosen.unit_basis.clone()),
+        (None, None) => (all.to_vec(), Basis::new(Confidence::Likely, "")),
     }
 }

@@ -108,7 +108,11 @@ fn is_comment(line: &str) -> bool {
 
 impl Sheet {
     pub(super) fn open(file: &Path, writing: Writing) -> Result<Self, DatasetError> {
-        let text = text::read(file)?;
+        Self::of(file, text::read(file)?, writing)
+    }
+
+    /// Of a file's text, or of what stands in its place line by line.
+    pub(super) fn of(file: &Path, text: String, writing: Writing) -> Result<Self, DatasetError> {
         let all: Vec<(u64, &str)> =
             (1..).zip(text.lines()).filter(|(_, line)| !line.trim().is_empty()).take(PROBED_LINES).collect();
         let rows: Vec<(u64, &str)> = all.iter().copied().filter(|(_, line)| !is_comment(line)).collect();

@@ -149,6 +149,17 @@ impl Decimal {
     }
 }
 
+/// An instant that is written as a date with a time of day (ISO 8601, and with a space as pandas writes it),
+/// in units of 10⁻¹² s since 1970; without an offset it counts as UTC.
+pub(super) fn date_and_time(field: &str) -> Option<i128> {
+    // Numbers are no dates; `20240301` might be read as one.
+    if field.as_bytes().get(4).is_none_or(|byte| *byte != b'-') {
+        return None;
+    }
+    let instant: jiff::Timestamp = field.parse().or_else(|_| format!("{field}Z").parse()).ok()?;
+    Some(instant.as_nanosecond() * 1000)
+}
+
 /// Most digits of [`Decimal::exact`]: as many as an `i128` holds, less the three of a sum of times.
 const MAX_EXACT_DIGITS: i64 = 36;
 
@@ -225,6 +236,18 @@ mod tests {
         assert_eq!(Decimal::Point.exact("7e-400"), Some(0));
         for wrong in ["", ".", "x", "1,5", "NaN", "inf", "--1", "e3", "1e", "1e99", "1e9999999999"] {
             assert_eq!(Decimal::Point.exact(wrong), None, "{wrong}");
+        }
+    }
+
+    #[test]
+    fn dates_are_instants_to_the_nanosecond() {
+        let noon = 1_709_294_400_i128 * 10_i128.pow(12);
+        assert_eq!(date_and_time("2024-03-01T12:00:00Z"), Some(noon));
+        assert_eq!(date_and_time("2024-03-01 12:00:00.123456+00:00"), Some(noon + 123_456_000_000));
+        assert_eq!(date_and_time("2024-03-01 13:00:00.123456789+01:00"), Some(noon + 123_456_789_000));
+        assert_eq!(date_and_time("2024-03-01 12:00:00"), Some(noon));
+        for wrong in ["", "2024", "20240301", "2024-03-01", "1709294400.5", "12:00:00"] {
+            assert_eq!(date_and_time(wrong), None, "{wrong}");
         }
     }
 }

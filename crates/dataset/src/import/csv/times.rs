@@ -1,7 +1,8 @@
 //! The unit of a sheet's times: by name, by the size of an epoch, by the steps, and by the speed at which the
 //! robot would have gone.
 
-use super::columns::{Log, Roles};
+use super::columns::Roles;
+use super::log::Log;
 use super::options::Options;
 use super::sheet::Sheet;
 use super::text::EXACT_SCALE;
@@ -24,15 +25,16 @@ const EPOCH_S: std::ops::Range<f64> = 1e9..5e9;
 const SPAN_RATIO: f64 = 3.0;
 
 /// What is known of a log besides its stamps.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct KnownMotion {
-    /// How far the wheels went in one unit of time while they moved, metres.
-    pub(super) speed_m_per_unit: Option<f64>,
+    /// How far the wheels went in one unit of time while they moved, metres, in each unit that they may be
+    /// in, the usual first; none of rates.
+    pub(super) speeds_m_per_unit: Vec<f64>,
     /// How long the odometry is that this truth belongs to, seconds.
     pub(super) odometry_s: Option<f64>,
 }
 
-const fn per_second(unit: Unit) -> i128 {
+pub(super) const fn per_second(unit: Unit) -> i128 {
     match unit {
         Unit::Ms => 1_000,
         Unit::Us => 1_000_000,
@@ -62,9 +64,15 @@ pub(super) fn unit_of_time(
     roles: &Roles,
     log: &Log,
     options: &Options,
-    known: KnownMotion,
+    known: &KnownMotion,
 ) -> Result<(Unit, Basis), DatasetError> {
     let chosen = &roles.of[&Quantity::Time];
+    if log.is_dated {
+        return Ok((Unit::S, Basis::new(Confidence::Certain, "dates with a time of day")));
+    }
+    if roles.has(Quantity::Nanoseconds) {
+        return Ok((Unit::S, Basis::new(Confidence::Certain, "seconds with nanoseconds in a column of their own")));
+    }
     if let Some(unit) = chosen.unit.filter(|_| chosen.unit_basis.confidence == Confidence::Given) {
         return Ok((unit, chosen.unit_basis.clone()));
     }
@@ -101,9 +109,19 @@ pub(super) fn unit_of_time(
         }
     }
     let by_step: Vec<Unit> = Unit::TIMES.into_iter().filter(|unit| STEPS_S.contains(&in_s(step, *unit))).collect();
-    let speed = |unit: Unit| known.speed_m_per_unit.map(|speed| speed * per_second(unit) as f64);
-    let is_plausible = |unit: &Unit| speed(*unit).is_none_or(|speed| SPEEDS_M_S.contains(&speed));
-    let left: Vec<Unit> = by_step.iter().copied().filter(is_plausible).collect();
+    let at = |speed: Option<&f64>, unit: Unit| speed.map(|speed| speed * per_second(unit) as f64);
+    let by_speed = |of: Option<&f64>| -> Vec<Unit> {
+        let is_plausible = |unit: &Unit| at(of, *unit).is_none_or(|speed| SPEEDS_M_S.contains(&speed));
+        by_step.iter().copied().filter(is_plausible).collect()
+    };
+    let usual = known.speeds_m_per_unit.first();
+    // Counts that are none of a counter may be those since the row before.
+    let others = || known.speeds_m_per_unit.iter().skip(1).map(|of| (Some(of), by_speed(Some(of))));
+    let (of, left) = match by_speed(usual) {
+        left if left.is_empty() => others().find(|(_, left)| !left.is_empty()).unwrap_or((usual, left)),
+        left => (usual, left),
+    };
+    let speed = |unit: Unit| at(of, unit);
     match left[..] {
         [unit] => {
             let at = speed(unit).map_or(String::new(), |speed| format!(", wheels at {speed:.2} m/s"));

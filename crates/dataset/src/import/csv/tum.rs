@@ -10,8 +10,9 @@ use std::path::{Path, PathBuf};
 
 use kinematics::{Pose, sin_cos, wrap_to_pi};
 
-use super::columns::{Chosen, Log, PoseColumns, Roles};
-use super::options::Options;
+use super::columns::{Chosen, Roles};
+use super::log::{Log, PoseColumns};
+use super::options::{FileRole, Options};
 use super::runs::Part;
 use super::sheet::{Sheet, Writing};
 use super::text::{self, Decimal, Delimiter};
@@ -61,9 +62,8 @@ pub fn read_tum(truths: &[PathBuf], motion: TumMotion<'_>, options: &Options) ->
     let mut remarks = Vec::new();
     let mut all = match motion {
         TumMotion::Wheels(files) => {
-            let mut parts = parts(files, options)?;
-            parts.iter_mut().for_each(leave_poses_out);
-            parts
+            let files: Vec<_> = files.iter().map(|file| (file.clone(), FileRole::Wheels)).collect();
+            parts(&files, options)?
         }
         TumMotion::Odometry(files) => {
             files.iter().map(|file| odometry(file, &mut remarks)).collect::<Result<Vec<_>, _>>()?
@@ -82,21 +82,19 @@ pub fn read_tum(truths: &[PathBuf], motion: TumMotion<'_>, options: &Options) ->
     Ok(found)
 }
 
-/// The trajectories are the truth; poses beside the wheels are not.
-fn leave_poses_out(part: &mut Part) {
-    use Quantity::{Heading, Qw, Qx, Qy, Qz, X, Y};
-    for quantity in [X, Y, Heading, Qx, Qy, Qz, Qw] {
-        if let Some(chosen) = part.roles.of.remove(&quantity) {
-            part.roles.left_out.push(part.sheet.names[chosen.index].clone());
-        }
-    }
-    part.log.pose = None;
-}
-
 /// A column that the format fixes.
 fn fixed(index: usize, unit: Option<Unit>, why: &str) -> Chosen {
     let basis = Basis::new(Confidence::Certain, why);
-    Chosen { index, unit, basis: basis.clone(), unit_basis: basis, is_rate: false, is_counted: false }
+    Chosen {
+        index,
+        unit,
+        basis: basis.clone(),
+        unit_basis: basis,
+        is_rate: false,
+        is_counted: false,
+        is_angle: false,
+        is_outside: true,
+    }
 }
 
 fn open(file: &Path) -> Result<Sheet, DatasetError> {
@@ -178,7 +176,7 @@ fn read_poses(file: &Path, remarks: &mut Vec<String>) -> Result<Part, DatasetErr
             file.display()
         ));
     }
-    Ok(Part { sheet, roles, log })
+    Ok(Part { sheet, roles, log, shift_ps: 0 })
 }
 
 /// Is every heading the same, while the robot moves over a plane?
@@ -196,7 +194,7 @@ fn is_heading_constant(pose: &PoseColumns) -> bool {
 
 /// Twists over the intervals between the poses of the robot's own dead reckoning.
 fn odometry(file: &Path, remarks: &mut Vec<String>) -> Result<Part, DatasetError> {
-    let Part { sheet, mut roles, mut log } = read_poses(file, remarks)?;
+    let Part { sheet, mut roles, mut log, .. } = read_poses(file, remarks)?;
     let poses = log.pose.take().unwrap_or_default();
     if poses.theta.iter().any(|theta| !theta.is_finite()) {
         let message = "poses without a heading say nothing of how the robot turned; give its wheels by --wheels";
@@ -234,7 +232,7 @@ fn odometry(file: &Path, remarks: &mut Vec<String>) -> Result<Part, DatasetError
     let why = "of the motion from pose to pose";
     roles.of.insert(Quantity::Speed, fixed(1, Some(Unit::MPerS), why));
     roles.of.insert(Quantity::YawRate, fixed(6, Some(Unit::RadPerS), why));
-    Ok(Part { sheet, roles, log })
+    Ok(Part { sheet, roles, log, shift_ps: 0 })
 }
 
 #[cfg(test)]

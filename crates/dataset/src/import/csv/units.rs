@@ -1,10 +1,16 @@
-//! The units of wheels, positions and headings, where no name says them: those in which the wheels by the
-//! nominal robot and the poses tell of the same motion.
+//! The units of wheels and positions, where no name says them: the odds of each reading, by how far the
+//! wheels of the stated robot and the poses reach, and by the speeds and distances that robots drive.
+//!
+//! Model: the logarithm of the ratio of both reaches is normal about 0. Of most robots the stated lengths are
+//! right within a few per cent; of some they are not at all, so that the tails are wide (a mixture of three
+//! widths). Priors are what people log in. Units that differ by a small factor need more than the odds of a
+//! robot that is stated wrongly.
 
-use kinematics::{DriveGeometry, Increment, Pose, Wheels, wrap_to_pi};
-
-use super::columns::Chosen;
-use super::options::{Options, Rates};
+use super::angles::angle_unit;
+use super::columns::known_or;
+use super::drive::{Drive, WheelUnits, dead_reckoned, wheel_candidates};
+use super::gyro;
+use super::options::Options;
 use super::runs::{Part, RawRun};
 use super::times::seconds;
 use super::took::{Basis, Confidence};
@@ -12,9 +18,19 @@ use crate::column_names::Quantity;
 use crate::error::DatasetError;
 use crate::unit::Unit;
 
-/// Poses and wheels tell of the same motion where they reach equally far within this factor. Nominal and true
-/// wheels differ by a few per cent; units differ by at least 1.45 (rad/s and m against deg/s and inches).
-const MAX_EQUAL_EXTENT_RATIO: f64 = 1.2;
+use kinematics::Pose;
+
+/// Odds from which on a reading is taken.
+const MIN_ODDS: f64 = 20.0;
+
+/// Odds from which on a reading is taken against one that differs by less than [`SMALL_FACTOR`]. Derived: a
+/// robot whose stated wheels are right within 5 % has 130 to 1 against a factor of 9.55; one that is stated
+/// wrongly by a factor never has more than 60 to 1.
+const MIN_ODDS_OF_SMALL_FACTOR: f64 = 100.0;
+
+/// Factors below are those of units that a wrongly stated robot may pass for: rpm and rad/s 9.55, degrees and
+/// counts, inches and centimetres 2.54, km/h and m/s 3.6.
+const SMALL_FACTOR: f64 = 12.0;
 
 /// From here on a user should look, though the units are known: counts of a turn are mistaken by a factor of
 /// 2 or 4, diameters and radii by 2.
@@ -23,51 +39,21 @@ const MAX_USUAL_EXTENT_RATIO: f64 = 1.5;
 /// Below this reach, metres, wheels say nothing of the unit of length: a spin wanders so far.
 const MIN_EXTENT_M: f64 = 0.1;
 
-/// Turns between two poses that say something of the unit of angle, radians: well above the noise of
-/// headings, and not so long that the nominal robot's error passes for another turn.
-const TELLING_TURN_RAD: std::ops::RangeInclusive<f64> = 0.2..=12.0;
+/// How far the poses of a robot reach that hardly drives, metres, and the logarithm's width.
+const IDLE_EXTENT_M: f64 = 0.02;
+const IDLE_LOG_SIGMA: f64 = 1.5;
 
-/// The residuals of the right unit of angle are this many times smaller than the other's: those of a wrong
-/// one are as large as the turns (radians in degrees) or random (degrees in radians).
-const CLEARER: f64 = 3.0;
+/// Widths of the logarithm of the ratio of both reaches, and the shares of robots that have them: stated by a
+/// data sheet, by a ruler, or by guess.
+const LOG_RATIO: [(f64, f64); 3] = [(0.3, 0.01), (0.3, 0.05), (0.4, 1.0)];
 
-/// Drive and counts by which wheels become motion.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Drive {
-    pub(super) geometry: DriveGeometry,
-    pub(super) ticks_per_rev: Option<f64>,
-    pub(super) rates: Rates,
-}
+/// Mean speed of a wheeled robot while it moves, and how far from its start it goes: from a table to a field.
+const SPEEDS_M_S: std::ops::RangeInclusive<f64> = 0.01..=10.0;
+const EXTENTS_M: std::ops::RangeInclusive<f64> = 0.05..=2000.0;
 
-impl Drive {
-    /// Metres of one unit of a wheel's column, or metres a second.
-    pub(super) fn m_per_unit(&self, unit: Unit) -> Option<Wheels<f64>> {
-        let m_per_rad = self.geometry.m_per_rad();
-        match unit {
-            Unit::Ticks => self.geometry.m_per_count(self.ticks_per_rev?).ok(),
-            _ if unit.is_of_contact() || Unit::LENGTHS.contains(&unit) => Some(Wheels::both(unit.to_si(1.0))),
-            _ => Some(m_per_rad.map(|m_per_rad| m_per_rad * unit.to_si(1.0))),
-        }
-    }
-}
-
-/// What the wheels' columns are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum WheelUnits {
-    /// Both wheels in one unit.
-    Wheels(Unit),
-    /// Speed and yaw rate.
-    Twist([Unit; 2]),
-}
-
-impl WheelUnits {
-    fn name(self) -> String {
-        match self {
-            Self::Wheels(unit) => format!("wheels in {}", unit.name()),
-            Self::Twist([speed, yaw_rate]) => format!("v in {}, omega in {}", speed.name(), yaw_rate.name()),
-        }
-    }
-}
+/// Logarithm of how much less likely a speed or an extent is that no usual robot has, and for each factor e
+/// beyond.
+const UNUSUAL: f64 = -3.0;
 
 /// The units of one part's columns.
 #[derive(Debug, Clone)]
@@ -78,107 +64,49 @@ pub(super) struct Units {
     pub(super) length_by: Basis,
     pub(super) angle: Unit,
     pub(super) angle_by: Basis,
-    pub(super) remark: Option<String>,
+    /// The gyroscope's; `None`: there is none, or its rates are left out.
+    pub(super) gyro: Option<(Unit, Basis)>,
+    pub(super) remarks: Vec<String>,
 }
 
-/// How far the wheels of a log go in one unit of its time, metres, while they move; `None` for rates.
-pub(super) fn speed_m_per_unit(part: &Part, units: WheelUnits, drive: &Drive) -> Option<f64> {
-    let WheelUnits::Wheels(unit) = units else { return None };
-    let m = drive.m_per_unit(unit).filter(|_| !unit.is_rate())?;
-    let log = &part.log;
-    let [left, right] = log.wheels.as_ref()?;
-    let rows: Vec<usize> = (0..log.time.len()).filter(|&row| log.has_wheels_at(row)).collect();
-    let (mut distance_m, mut time) = (0.0, 0.0);
-    for pair in rows.windows(2) {
-        let moved = |column: &[f64], m: f64| (column[pair[1]] - column[pair[0]]).abs() * m;
-        let of_pair = 0.5 * (moved(left, m.left) + moved(right, m.right));
-        if of_pair > 0.0 && log.run_of(pair[0]) == log.run_of(pair[1]) {
-            distance_m += of_pair;
-            time += seconds(log.time[pair[0]], log.time[pair[1]]);
-        }
-    }
-    (time > 0.0).then(|| distance_m / time)
+/// One reading of the columns.
+struct Reading<'a> {
+    wheels: WheelUnits,
+    length: Unit,
+    /// How many times as far as by the wheels the poses reach; `None` of a robot that hardly drives.
+    ratio: Option<f64>,
+    log_odds: f64,
+    /// Poses by the wheels, a run each.
+    poses: &'a [Vec<Pose>],
 }
 
-/// What a run's wheels may be, before poses are looked at.
-pub(super) fn wheel_candidates(part: &Part, options: &Options) -> (Vec<WheelUnits>, Basis) {
-    let Some(pair) = part.roles.wheels() else { return (Vec::new(), Basis::new(Confidence::Assumed, "")) };
-    let chosen = pair.map(|quantity| &part.roles.of[&quantity]);
-    if pair[0] == Quantity::Speed {
-        let of = |chosen: &Chosen, usual| chosen.unit.unwrap_or(usual);
-        let units = [of(chosen[0], Unit::MPerS), of(chosen[1], Unit::RadPerS)];
-        let known = chosen.iter().all(|chosen| chosen.unit.is_some());
-        let basis =
-            if known { chosen[0].unit_basis.clone() } else { Basis::new(Confidence::Likely, "usual for a twist") };
-        return (vec![WheelUnits::Twist(units)], basis);
-    }
-    let of = |units: &[Unit]| units.iter().copied().map(WheelUnits::Wheels).collect::<Vec<_>>();
-    let given = chosen[0].unit.filter(|_| chosen[0].unit_basis.confidence == Confidence::Given);
-    if let Some(unit) = given {
-        return (of(&[unit]), chosen[0].unit_basis.clone());
-    }
-    if let Some(unit) = options.wheel_unit {
-        return (of(&[unit]), Basis::new(Confidence::Given, "--wheel-unit"));
-    }
-    if let Some(unit) = chosen[0].unit.or(chosen[1].unit) {
-        return (of(&[unit]), chosen[0].unit_basis.clone());
-    }
-    if chosen[0].is_counted && chosen[1].is_counted {
-        return (of(&[Unit::Ticks]), Basis::new(Confidence::Likely, "names"));
-    }
-    if chosen[0].is_rate && chosen[1].is_rate {
-        return (
-            of(&[Unit::RadPerS, Unit::DegPerS, Unit::Rpm, Unit::MPerS, Unit::MmPerS]),
-            Basis::new(Confidence::Likely, ""),
-        );
-    }
-    let are_whole = part.log.wheels.iter().flatten().flatten().all(|value| value.is_nan() || value.fract() == 0.0);
-    if are_whole {
-        return (of(&[Unit::Ticks]), Basis::new(Confidence::Likely, "whole numbers"));
-    }
-    (
-        of(&[Unit::Rad, Unit::Deg, Unit::RadPerS, Unit::DegPerS, Unit::Rpm, Unit::MPerS]),
-        Basis::new(Confidence::Likely, ""),
-    )
-}
-
-/// Poses by the wheels at the instants of the truth, from the first of them on.
-fn dead_reckoned(parts: &[Part], run: &RawRun, units: WheelUnits, drive: &Drive) -> Vec<Pose> {
-    let (part, truth) = (&parts[run.part], &parts[run.truth_part]);
-    let Some([first, second]) = &part.log.wheels else { return Vec::new() };
-    let (mut poses, mut pose, mut waiting) = (Vec::new(), Pose::IDENTITY, run.truth_rows.iter().peekable());
-    let increment = |before: usize, row: usize| -> Option<Increment> {
-        let dt_s = seconds(part.log.time[before], part.log.time[row]);
-        let rate = |column: &[f64]| match drive.rates {
-            Rates::IntervalEnd => column[row],
-            Rates::Instantaneous => 0.5 * (column[before] + column[row]),
-        };
-        match units {
-            WheelUnits::Twist([speed, yaw_rate]) => Some(Increment {
-                distance_m: speed.to_si(rate(first)) * dt_s,
-                turn_rad: yaw_rate.to_si(rate(second)) * dt_s,
-            }),
-            WheelUnits::Wheels(unit) => {
-                let moved = |column: &[f64]| {
-                    if unit.is_rate() { rate(column) * dt_s } else { column[row] - column[before] }
-                };
-                let moved = Wheels { left: moved(first), right: moved(second) };
-                Some(drive.geometry.increment(moved.zip_with(drive.m_per_unit(unit)?, |moved, m| moved * m)))
-            }
-        }
+/// What people log in.
+fn log_prior(wheels: WheelUnits, length: Unit) -> f64 {
+    let of_length: f64 = match length {
+        Unit::M => 0.55,
+        Unit::Mm => 0.35,
+        Unit::Cm => 0.07,
+        _ => 0.03,
     };
-    for (index, &row) in run.rows.iter().enumerate() {
-        if let Some(before) = index.checked_sub(1)
-            && let Some(increment) = increment(run.rows[before], row)
-        {
-            pose = pose * increment.arc();
-        }
-        while waiting.next_if(|&&seen| truth.log.time[seen] <= part.log.time[row]).is_some() {
-            poses.push(pose);
-        }
-    }
-    // Poses after the last row are of a robot that no one watched any more.
-    poses
+    let of_wheels: f64 = match wheels.of_wheels() {
+        Some(Unit::Ticks | Unit::Rad) => 0.8,
+        Some(Unit::RadPerS | Unit::MPerS) => 0.4,
+        Some(Unit::Rpm) => 0.2,
+        Some(Unit::TicksPerRow) => 0.01,
+        _ => 0.1,
+    };
+    of_length.ln() + of_wheels.ln()
+}
+
+fn log_density_of_ratio(ratio: f64) -> f64 {
+    let of = |(share, sigma): (f64, f64)| share / sigma * (-0.5 * (ratio.ln() / sigma).powi(2)).exp();
+    // Far out the narrow ones are nothing, and the wide one still is not.
+    LOG_RATIO.into_iter().map(of).sum::<f64>().max(f64::MIN_POSITIVE).ln()
+}
+
+fn log_of_range(value: f64, usual: &std::ops::RangeInclusive<f64>) -> f64 {
+    let beyond = (value / usual.end()).max(if value > 0.0 { usual.start() / value } else { 0.0 });
+    if beyond <= 1.0 || !beyond.is_finite() { 0.0 } else { UNUSUAL * (1.0 + beyond.ln()) }
 }
 
 /// The largest distance from the first of some positions.
@@ -188,174 +116,197 @@ fn extent_m(positions: impl Iterator<Item = (f64, f64)>) -> f64 {
     positions.map(|position| (position.0 - x).hypot(position.1 - y)).fold(0.0, f64::max)
 }
 
+/// How many times as far the poses of the runs go as the wheels do, in units of the poses by metres: in
+/// pieces of the runs, so that errors of the turns do not count. A piece weighs by its length by the wheels:
+/// of spins, in which an instrument beside the centre goes round, nothing counts.
+fn ratio_of_pieces(parts: &[Part], runs: &[RawRun], poses: &[Vec<Pose>]) -> f64 {
+    /// Pieces of a run: each turns little, and is long against the noise of positions.
+    const PIECES: usize = 32;
+    let (mut product, mut square) = (0.0, 0.0);
+    for (run, poses) in runs.iter().zip(poses) {
+        let Some(seen) = &parts[run.truth_part].log.pose else { continue };
+        let rows = &run.truth_rows[..poses.len().min(run.truth_rows.len())];
+        let Some(last) = rows.len().checked_sub(1) else { continue };
+        let step = (last / PIECES).max(1);
+        let ends: Vec<usize> = (0..=last).step_by(step).collect();
+        for pair in ends.windows(2) {
+            let ([a, b], [from, to]) = ([rows[pair[0]], rows[pair[1]]], [poses[pair[0]], poses[pair[1]]]);
+            let of_poses = (seen.x[b] - seen.x[a]).hypot(seen.y[b] - seen.y[a]);
+            let of_wheels_m = (to.x_m - from.x_m).hypot(to.y_m - from.y_m);
+            product += of_poses * of_wheels_m;
+            square += of_wheels_m * of_wheels_m;
+        }
+    }
+    product / square
+}
+
+/// Mean speed of the wheels while they move, and the one that they exceed in a hundredth of the rows, m/s.
+fn speeds_m_s(parts: &[Part], runs: &[RawRun], wheels: WheelUnits, drive: &Drive) -> Option<[f64; 2]> {
+    let (mut distance_m, mut time_s, mut speeds_m_s) = (0.0, 0.0, Vec::new());
+    for run in runs {
+        let part = &parts[run.part];
+        let increments = drive.increments(part, &run.rows, wheels);
+        for (pair, increment) in run.rows.windows(2).zip(increments.iter().skip(1)) {
+            let half_base_m = 0.5 * drive.geometry.wheel_separation_m();
+            let of_wheels_m = increment.distance_m.abs().max(increment.turn_rad.abs() * half_base_m);
+            let dt_s = seconds(part.log.time[pair[0]], part.log.time[pair[1]]);
+            if of_wheels_m > 0.0 && dt_s > 0.0 {
+                distance_m += of_wheels_m;
+                time_s += dt_s;
+                speeds_m_s.push(of_wheels_m / dt_s);
+            }
+        }
+    }
+    let index = speeds_m_s.len().checked_sub(1)? * 99 / 100;
+    let (_, fast_m_s, _) = speeds_m_s.select_nth_unstable_by(index, f64::total_cmp);
+    Some([distance_m / time_s, *fast_m_s])
+}
+
 /// Decides the units of the wheels of one part and of the poses that saw its runs.
 pub(super) fn units(parts: &[Part], runs: &[RawRun], options: &Options, drive: &Drive) -> Result<Units, DatasetError> {
     let (part, truth) = (&parts[runs[0].part], &parts[runs[0].truth_part]);
     let (wheels, mut wheels_by) = wheel_candidates(part, options);
-    let (lengths, mut length_by) =
-        known_or(&truth.roles.of[&Quantity::X], options.length_unit, "--length-unit", &Unit::LENGTHS);
+    let (lengths, mut length_by) = match truth.roles.of.get(&Quantity::X) {
+        Some(chosen) => known_or(chosen, options.length_unit, "--length-unit", &Unit::LENGTHS),
+        None => (vec![Unit::M], Basis::new(Confidence::Certain, "no poses")),
+    };
     let by_unit: Vec<(WheelUnits, Vec<Vec<Pose>>)> = wheels
         .iter()
         .map(|&units| (units, runs.iter().map(|run| dead_reckoned(parts, run, units, drive)).collect()))
         .collect();
     let mut readings: Vec<Reading<'_>> = Vec::new();
     for (units, poses) in &by_unit {
-        let (mut seen, mut reckoned) = (0.0, 0.0);
+        let (mut seen, mut dead_reckoned_m) = (0.0, 0.0);
         for (run, poses) in runs.iter().zip(poses) {
             let pose = parts[run.truth_part].log.pose.as_ref();
             let position = |&row: &usize| pose.map(|pose| (pose.x[row], pose.y[row]));
             seen += extent_m(run.truth_rows.iter().take(poses.len()).filter_map(position));
-            reckoned += extent_m(poses.iter().map(|pose| (pose.x_m, pose.y_m)));
+            dead_reckoned_m += extent_m(poses.iter().map(|pose| (pose.x_m, pose.y_m)));
         }
-        for &length in &lengths {
-            let ratio = (reckoned >= MIN_EXTENT_M && seen > 0.0).then(|| length.to_si(seen) / reckoned);
-            readings.push((*units, length, ratio, poses));
-        }
-    }
-    let fits = |ratio: &Option<f64>, factor: f64| ratio.is_some_and(|ratio| (1.0 / factor..=factor).contains(&ratio));
-    let is_open = readings.len() > 1;
-    let mut remark = None;
-    let fitting: Vec<_> = if is_open {
-        readings.iter().filter(|reading| fits(&reading.2, MAX_EQUAL_EXTENT_RATIO)).collect()
-    } else {
-        readings.iter().collect()
-    };
-    let &&(units, length, ratio, poses) = match &fitting[..] {
-        [one] => one,
-        _ => return Err(undecided_extent(part, truth, &readings, &fitting)),
-    };
-    if let Some(ratio) = ratio {
-        let why = format!("poses reach {ratio:.3} times as far as wheels");
-        if lengths.len() > 1 {
-            length_by = Basis::new(Confidence::Likely, why.clone());
-        }
-        if wheels.len() > 1 {
-            wheels_by = Basis::new(Confidence::Likely, why);
-        }
-        if !is_open && !fits(&Some(ratio), MAX_USUAL_EXTENT_RATIO) {
-            remark = Some(format!(
-                "the poses reach {ratio:.3} times as far as the wheels by the nominal robot; look at the units, --wheel and --ticks-per-rev"
-            ));
-        }
-    }
-    let (angle, angle_by) = angle_unit(parts, runs, options, poses)?;
-    Ok(Units { wheels: units, wheels_by, length, length_by, angle, angle_by, remark })
-}
-
-/// A unit that is said or named, or all that it may be.
-fn known_or(chosen: &Chosen, flag: Option<Unit>, name: &str, all: &[Unit]) -> (Vec<Unit>, Basis) {
-    match (chosen.unit, flag) {
-        (Some(unit), _) if chosen.unit_basis.confidence == Confidence::Given => (vec![unit], chosen.unit_basis.clone()),
-        (_, Some(unit)) => (vec![unit], Basis::new(Confidence::Given, name)),
-        (Some(unit), None) => (vec![unit], chosen.unit_basis.clone()),
-        (None, None) => (all.to_vec(), Basis::new(Confidence::Likely, "")),
-    }
-}
-
-/// Units of wheels and positions, how many times as far the poses then reach, and the poses by the wheels of
-/// each run.
-type Reading<'a> = (WheelUnits, Unit, Option<f64>, &'a Vec<Vec<Pose>>);
-
-fn undecided_extent(part: &Part, truth: &Part, all: &[Reading<'_>], fitting: &[&Reading<'_>]) -> DatasetError {
-    let many_wheels = all.iter().any(|reading| reading.0 != all[0].0);
-    let many_lengths = all.iter().any(|reading| reading.1 != all[0].1);
-    let name = |reading: &Reading<'_>| match (many_wheels, many_lengths) {
-        (true, true) => format!("{} with x, y in {}", reading.0.name(), reading.1.name()),
-        (true, false) => reading.0.name(),
-        (false, _) => reading.1.name().to_owned(),
-    };
-    let (why, mut readings) = if fitting.is_empty() {
-        let first = all[0];
-        let why = first.2.map_or("the robot does not go far enough to tell".to_owned(), |ratio| {
-            format!(
-                "none fits: with {} the poses reach {ratio:.3} times as far as the wheels by the nominal robot; are --wheel and --ticks-per-rev right?",
-                name(&first)
-            )
+        let of_speed = speeds_m_s(parts, runs, *units, drive).map_or(0.0, |[mean_m_s, fast_m_s]| {
+            log_of_range(mean_m_s, &SPEEDS_M_S).min(log_of_range(fast_m_s, &(0.0..=*SPEEDS_M_S.end())))
         });
-        (format!(" ({why})"), all.iter().map(name).collect::<Vec<_>>())
-    } else {
-        (String::new(), fitting.iter().map(|reading| name(reading)).collect())
-    };
-    readings.dedup();
-    let flags = [(many_wheels, "--wheel-unit"), (many_lengths, "--length-unit")];
-    let flags: Vec<_> = flags.into_iter().filter(|(open, _)| *open).map(|(_, flag)| format!("{flag} UNIT")).collect();
-    DatasetError::Undecided {
-        file: if many_wheels { part.sheet.file.clone() } else { truth.sheet.file.clone() },
-        what: format!("the unit of {}{why}", if many_wheels { "the wheels" } else { "x and y" }),
-        readings: readings.join(" or "),
-        flag: flags.join(" and "),
+        let ratio = ratio_of_pieces(parts, runs, poses);
+        for &length in &lengths {
+            let seen_m = length.to_si(seen);
+            let ratio = length.to_si(ratio);
+            let ratio = (dead_reckoned_m >= MIN_EXTENT_M && ratio > 0.0 && ratio.is_finite()).then_some(ratio);
+            let of_extent = match ratio {
+                Some(ratio) => log_density_of_ratio(ratio) + log_of_range(seen_m, &EXTENTS_M),
+                None if seen > 0.0 => -0.5 * ((seen_m / IDLE_EXTENT_M).ln() / IDLE_LOG_SIGMA).powi(2),
+                None => 0.0,
+            };
+            let log_odds = log_prior(*units, length) + of_speed + of_extent;
+            readings.push(Reading { wheels: *units, length, ratio, log_odds, poses });
+        }
+    }
+    readings.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
+    let best = &readings[0];
+    let open: Vec<&Reading<'_>> = readings[1..].iter().filter(|rival| !is_clear(best, rival)).collect();
+    if !open.is_empty() {
+        return Err(undecided(part, truth, best, &open));
+    }
+    let mut remarks = Vec::new();
+    let against = readings.get(1).map(|rival| {
+        let name = name(rival, rival.wheels != best.wheels, rival.length != best.length);
+        format!("odds {} against {name}", odds(best.log_odds - rival.log_odds))
+    });
+    let of_extent = best.ratio.map(|ratio| format!("poses reach {ratio:.3} times as far as wheels"));
+    let why: Vec<String> = of_extent.into_iter().chain(against).collect();
+    if lengths.len() > 1 {
+        length_by = Basis::new(Confidence::Likely, why.join(", "));
+    }
+    if wheels.len() > 1 {
+        let why = if length_by.why == why.join(", ") { why[..why.len() - 1].join("") } else { why.join(", ") };
+        let of_name = Some(wheels_by.why).filter(|why| !why.is_empty()).map(|by| format!("{by}; "));
+        wheels_by = Basis::new(Confidence::Likely, of_name.unwrap_or_default() + &why);
+    }
+    if let Some(ratio) = best.ratio
+        && !(1.0 / MAX_USUAL_EXTENT_RATIO..=MAX_USUAL_EXTENT_RATIO).contains(&ratio)
+    {
+        remarks.push(format!(
+            "the poses reach {ratio:.3} times as far as the wheels by the nominal robot; look at the units, --wheel and --ticks-per-rev"
+        ));
+    }
+    if options.cut_s.is_some() && wheels.len() > 1 && best.wheels.of_wheels().is_some_and(Unit::is_per_row) {
+        return Err(DatasetError::Undecided {
+            file: part.sheet.file.clone(),
+            what: "a standstill for --cut".to_owned(),
+            readings: "rows that say the same or rows of zeros, as the wheels are likely counted a row".to_owned(),
+            flag: "--wheel-unit ticks/row or --wheel-unit ticks".to_owned(),
+        });
+    }
+    let (angle, angle_by) = angle_unit(parts, runs, options, best.poses)?;
+    let turns_rad: Vec<Vec<f64>> = runs
+        .iter()
+        .map(|run| drive.increments(&parts[run.part], &run.rows, best.wheels).iter().map(|by| by.turn_rad).collect())
+        .collect();
+    let is_needed = !truth.roles.has_pose() && options.tape.is_none();
+    let gyro = gyro::unit(parts, runs, &turns_rad, is_needed, &mut remarks)?;
+    Ok(Units { wheels: best.wheels, wheels_by, length: best.length, length_by, angle, angle_by, gyro, remarks })
+}
+
+/// Whether a reading is to be taken against another.
+fn is_clear(best: &Reading<'_>, rival: &Reading<'_>) -> bool {
+    let are_lengths = [Unit::M, Unit::Mm];
+    // No robot drives a thousand times as far as its wheels say.
+    if best.wheels == rival.wheels
+        && best.ratio.is_some()
+        && [best.length, rival.length].iter().all(|unit| are_lengths.contains(unit))
+    {
+        return true;
+    }
+    let factor = best.ratio.zip(rival.ratio).map(|(best, rival)| (best / rival).max(rival / best));
+    let needed = if factor.is_some_and(|factor| factor < SMALL_FACTOR) { MIN_ODDS_OF_SMALL_FACTOR } else { MIN_ODDS };
+    best.log_odds - rival.log_odds >= needed.ln()
+}
+
+fn odds(log_odds: f64) -> String {
+    /// Odds are no better known than that.
+    const MOST: f64 = 1e6;
+    let odds = log_odds.exp();
+    if odds > MOST { "above a million to 1".to_owned() } else { format!("{odds:.0} to 1") }
+}
+
+fn name(reading: &Reading<'_>, of_wheels: bool, of_length: bool) -> String {
+    match (of_wheels, of_length) {
+        (true, true) => format!("{} with x, y in {}", reading.wheels.name(), reading.length.name()),
+        (true, false) => {
+            reading.wheels.of_wheels().map_or_else(|| reading.wheels.name(), |unit| unit.name().to_owned())
+        }
+        (false, _) => reading.length.name().to_owned(),
     }
 }
 
-/// The unit of the headings, if there are any.
-fn angle_unit(
-    parts: &[Part],
-    runs: &[RawRun],
-    options: &Options,
-    reckoned: &[Vec<Pose>],
-) -> Result<(Unit, Basis), DatasetError> {
-    let truth = &parts[runs[0].truth_part];
-    let Some(chosen) = truth.roles.of.get(&Quantity::Heading) else {
-        let why = if truth.roles.has(Quantity::Qw) { "a quaternion" } else { "no heading" };
-        return Ok((Unit::Rad, Basis::new(Confidence::Certain, why)));
+fn undecided(part: &Part, truth: &Part, best: &Reading<'_>, open: &[&Reading<'_>]) -> DatasetError {
+    /// So many readings are shown.
+    const SHOWN: usize = 4;
+    let all = || std::iter::once(best).chain(open.iter().copied()).take(SHOWN);
+    let of_wheels = all().any(|reading| reading.wheels != best.wheels);
+    let of_length = all().any(|reading| reading.length != best.length);
+    let described = |reading: &Reading<'_>| {
+        let ratio =
+            reading.ratio.map_or("hardly drives".to_owned(), |ratio| format!("poses reach {ratio:.3} times as far"));
+        let odds = odds(best.log_odds - reading.log_odds);
+        let odds = if std::ptr::eq(reading, best) { String::new() } else { format!(", {odds} against it") };
+        format!("{} ({ratio}{odds})", name(reading, of_wheels, of_length))
     };
-    let (candidates, basis) = known_or(chosen, options.angle_unit, "--angle-unit", &Unit::ANGLES);
-    if let [unit] = candidates[..] {
-        return Ok((unit, basis));
+    let mut flags: Vec<String> = Vec::new();
+    for reading in all() {
+        let of_wheels =
+            reading.wheels.of_wheels().filter(|_| of_wheels).map(|unit| format!("--wheel-unit {}", unit.name()));
+        let of_length = of_length.then(|| format!("--length-unit {}", reading.length.name()));
+        flags.push(of_wheels.into_iter().chain(of_length).collect::<Vec<_>>().join(" "));
     }
-    let theta =
-        |run: &RawRun, row: usize| parts[run.truth_part].log.pose.as_ref().map_or(f64::NAN, |pose| pose.theta[row]);
-    // By turns between poses.
-    let (mut squares, mut turns) = ([0.0, 0.0], 0);
-    for (run, reckoned) in runs.iter().zip(reckoned) {
-        let mut last = None;
-        for (&row, by_wheels) in run.truth_rows.iter().zip(reckoned) {
-            let theta = theta(run, row);
-            if !theta.is_finite() {
-                continue;
-            }
-            let Some((last_theta, last_rad)) = last else {
-                last = Some((theta, by_wheels.theta_rad));
-                continue;
-            };
-            let turn_rad: f64 = by_wheels.theta_rad - last_rad;
-            if turn_rad.abs() >= *TELLING_TURN_RAD.start() {
-                if turn_rad.abs() <= *TELLING_TURN_RAD.end() {
-                    turns += 1;
-                    for (square, unit) in squares.iter_mut().zip(Unit::ANGLES) {
-                        *square += wrap_to_pi(unit.to_si(theta - last_theta) - turn_rad).powi(2);
-                    }
-                }
-                last = Some((theta, by_wheels.theta_rad));
-            }
-        }
+    let why = if best.ratio.is_none() {
+        " (the robot does not go far enough to tell)"
+    } else {
+        " (compared with the wheels of the stated robot)"
+    };
+    DatasetError::Undecided {
+        file: if of_wheels { part.sheet.file.clone() } else { truth.sheet.file.clone() },
+        what: format!("the unit of {}{why}", if of_wheels { "the wheels" } else { "x and y" }),
+        readings: all().map(described).collect::<Vec<_>>().join(" or "),
+        flag: flags.join(" or "),
     }
-    let rms = squares.map(|square: f64| (square / f64::from(turns.max(1))).sqrt());
-    for (unit, own, other) in [(Unit::Rad, rms[0], rms[1]), (Unit::Deg, rms[1], rms[0])] {
-        if turns > 0 && CLEARER * own < other {
-            let why = format!("turns agree with the wheels to {own:.3} rad, {turns} of them");
-            return Ok((unit, Basis::new(Confidence::Likely, why)));
-        }
-    }
-    // By size: a heading that is wrapped stays within a turn.
-    let all: Vec<f64> = runs
-        .iter()
-        .flat_map(|run| run.truth_rows.iter().map(|&row| theta(run, row)))
-        .filter(|theta| theta.is_finite())
-        .collect();
-    let largest = all.iter().copied().map(f64::abs).fold(0.0, f64::max);
-    let leaps = all.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
-    if leaps > 180.0 && largest <= 360.0 {
-        return Ok((Unit::Deg, Basis::new(Confidence::Likely, format!("it leaps by {leaps:.1}, a whole turn"))));
-    }
-    if leaps > std::f64::consts::PI && largest <= std::f64::consts::TAU {
-        return Ok((Unit::Rad, Basis::new(Confidence::Likely, format!("it leaps by {leaps:.3}, a whole turn"))));
-    }
-    let why = if turns > 0 { "turns agree with the wheels' in neither" } else { "the robot hardly turns" };
-    Err(DatasetError::Undecided {
-        file: truth.sheet.file.clone(),
-        what: format!("the unit of {} (at most {largest}, and {why})", truth.sheet.names[chosen.index]),
-        readings: "rad or deg".to_owned(),
-        flag: "--angle-unit rad or --angle-unit deg".to_owned(),
-    })
 }
