@@ -95,7 +95,7 @@ fn a_sweep_answers_ctrl_c_at_once() {
     let mut child = Command::new("env")
         .args(["--default-signal=INT", env!("CARGO_BIN_EXE_yair")])
         .current_dir(here)
-        .args(["sweep", scenario, "--trials", "400", "--out", "sweep"])
+        .args(["sweep", scenario, "--trials", "4000", "--out", "sweep"])
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
         .spawn()

@@ -82,6 +82,8 @@ impl WorkFolder {
     /// # Errors
     /// The system's.
     pub fn rename_to(self, target: &Path) -> io::Result<()> {
+        // Else an end of the process could empty the folder while it is given its name.
+        let _begun = begun();
         fs::rename(&self.made, target)
     }
 
@@ -254,6 +256,23 @@ mod tests {
         broken.replace(&target).expect_err("there is nothing to put in its place");
         assert_eq!(fs::read_to_string(target.join("file")).expect("there"), "two");
         assert_eq!(names(temporary.path()), ["set"]);
+    }
+
+    #[test]
+    fn regress_no_folder_gets_its_name_while_it_is_taken_away() {
+        let temporary = tempfile::tempdir().expect("a folder");
+        let target = temporary.path().join("set");
+        let work = WorkFolder::beside(temporary.path()).expect("made");
+        let taking_away = begun();
+        let renaming = std::thread::spawn({
+            let target = target.clone();
+            move || work.rename_to(&target)
+        });
+        std::thread::sleep(std::time::Duration::from_millis(50));
+        assert!(!target.exists(), "it could be emptied meanwhile");
+        drop(taking_away);
+        renaming.join().expect("no panic").expect("renamed");
+        assert!(target.is_dir());
     }
 
     #[cfg(unix)]
