@@ -131,9 +131,11 @@ impl<'d> FirstScreen<'d> {
             return None;
         }
         let Compared { base, extended, low, high } = self.document.drift?.calibrated_over_nominal;
-        let numbers = |decimals: usize| (format!("{base:.decimals$}"), format!("{extended:.decimals$}"));
-        // Two digits of the smaller of both.
-        let (from, to) = numbers((1.0 - base.min(extended).max(1e-9).log10().floor()).clamp(0.0, 6.0) as usize);
+        let [from, to] = [base, extended].map(|drift| {
+            // The bars have more where their intervals are worth more.
+            let decimals = (1.0 - drift.max(1e-9).log10().floor()).clamp(0.0, 6.0) as usize;
+            format!("{drift:.decimals$}")
+        });
         Some(if low > 0.0 {
             format!("Calibrate the wheels first: the drift falls from {from} % to {to} % of the distance.")
         } else if high < 0.0 {

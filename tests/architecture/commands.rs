@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
+use crate::pictures::pictures_show_what_the_pages_say;
 use crate::support::real_data::real_data;
 use crate::support::succeed;
 use crate::{files, root, text};
@@ -84,7 +85,7 @@ const ORIGINALS: [(&str, &str); 2] = [("optiodom/data/", "optiodom"), ("calibrat
 
 /// Runs one command line of a document and returns its standard output, or `None` when it needs data that are
 /// not here.
-fn run(line: &str, folder: &Path) -> Option<String> {
+pub(crate) fn run(line: &str, folder: &Path) -> Option<String> {
     let (_, arguments) = line.split_once("yair ").or_else(|| line.split_once("cargo run --release -- "))?;
     let mut words: Vec<String> = arguments.split_whitespace().map(str::to_owned).collect();
     for word in &mut words {
@@ -218,6 +219,8 @@ fn shows_what_its_commands_print(document: &str, least: usize) {
     }
     if update {
         fs::write(root().join(document), written).expect("written");
+    } else if document == "docs/tutorial.md" {
+        pictures_show_what_the_pages_say(folder.path());
     }
     assert!(compared >= least, "{document}: {compared} outputs were compared");
 }
@@ -258,7 +261,7 @@ mod documents_show_what_commands_print {
 
     #[test]
     fn fleet() {
-        shows_what_its_commands_print("docs/fleet.md", 2);
+        shows_what_its_commands_print("docs/fleet.md", 4);
     }
 
     #[test]

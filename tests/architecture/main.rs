@@ -14,6 +14,7 @@ mod examples;
 mod file_graph;
 mod files;
 mod packages;
+mod pictures;
 mod python;
 mod settings;
 mod size;

@@ -277,7 +277,7 @@ async function firstScreen(page, name, kind) {
     check(name, "bars show the drift of the document", agree, `${bars.join(", ")}: ${values.map((one) => one.percent).join(", ")}`);
     const { base, extended, low } = drift.calibrated_over_nominal;
     if (low > 0) {
-      const numbers = (headline + shown.lead).match(/falls from ([\d.]+) % to ([\d.]+) %/);
+      const numbers = (headline + shown.lead).match(/falls from ([\d.]+)\s% to ([\d.]+)\s%/);
       const near = (text, value) => Math.abs(parseFloat(text) - value) <= 0.06 * value;
       check(name, "the sentence has the drift of the document", numbers !== null && near(numbers[1], base) && near(numbers[2], extended), headline);
     }
@@ -317,20 +317,22 @@ function tutorial() {
   yair("simulate", join(root, "scenarios/drifting.toml"), "--out", "lab");
   yair("import", "csv", "lab/odometry.csv", "lab/truth.csv", "--out", "monday", "--wheel", "0.16", "--base", "0.363", "--ticks-per-rev", "40000");
   yair("diagnose", "monday", "--out", "diagnosis");
+  yair("calibrate", "monday", "--out", "monday.toml");
+  yair("simulate", join(root, "scenarios/drifting.toml"), "--seed", "2", "--out", "lab-tuesday");
+  yair("import", "csv", "lab-tuesday/odometry.csv", "lab-tuesday/truth.csv", "--out", "tuesday", "--robot", "monday/dataset.toml");
+  for (const command of Object.values(OTHER_PAGES))
+    yair(...command.split(" ").map((word) => (word.startsWith("scenarios/") ? join(root, word) : word)));
 }
 
-/** Every other page of the same robot, by the subcommand that writes it. */
-function otherPages() {
-  yair("simulate", join(root, "scenarios/drifting.toml"), "--trial", "1", "--out", "tuesday");
-  yair("calibrate", "monday", "--method", "all", "--out", "monday.toml", "--out-dir", "calibrate");
-  yair("calibrate", "monday", "--out", "joint.toml");
-  yair("evaluate", "tuesday", "--calibration", "joint.toml", "--calibration", "diagnosis/extended.toml", "--out-dir", "evaluate");
-  yair("compare", "monday", "tuesday", "--out-dir", "compare");
-  yair("plan", "monday", "--out", "plan");
-  yair("sweep", join(root, "scenarios/noise-levels.toml"), "--trials", "400", "--out", "sweep");
-  yair("reproduce", "--trials", "400", "--out", "reproduce");
-  return ["calibrate", "evaluate", "compare", "plan", "sweep", "reproduce"];
-}
+/** Every other page of the same robot, by the command that writes it. */
+const OTHER_PAGES = {
+  calibrate: "calibrate monday --method all --out all.toml --out-dir calibrate",
+  evaluate: "evaluate tuesday --calibration monday.toml --calibration diagnosis/extended.toml --out-dir evaluate",
+  compare: "compare monday tuesday --out-dir compare",
+  plan: "plan monday --out plan",
+  sweep: "sweep scenarios/noise-levels.toml --trials 400 --out sweep",
+  reproduce: "reproduce --trials 400 --out reproduce",
+};
 
 /** Numbers with a hyphen for a minus sign, but for what is to be copied, which stays as programs read it. */
 const hyphenated = () => {
@@ -404,40 +406,58 @@ async function handle(browser, name, wanted) {
   await phone.close();
 }
 
+/** The file beside the screenshots: of each the texts that can be read in it, as far as no script writes them. A test
+ * (tests/architecture/pictures.rs) compares them with the pages that the commands write now. */
+const SHOWN = "report-pictures.json";
+
+/** The texts within `clip` of a page, in its order: those that no script wrote. */
+const shownTexts = (page, clip, source) => page.evaluate(({ clip, source }) => {
+  const written = new Set(), texts = [];
+  const nodes = (root) => document.createTreeWalker(root, NodeFilter.SHOW_TEXT);
+  const plain = (node) => node.data.replace(/\s+/g, " ").trim();
+  const own = nodes(new DOMParser().parseFromString(source, "text/html").body);
+  while (own.nextNode()) written.add(plain(own.currentNode));
+  const all = nodes(document.body);
+  while (all.nextNode()) {
+    const range = document.createRange(), text = plain(all.currentNode);
+    range.selectNode(all.currentNode);
+    const box = range.getBoundingClientRect(), top = box.top + window.scrollY;
+    const inside = box.width > 0 && top >= clip.y && top + box.height <= clip.y + clip.height;
+    if (text && inside && written.has(text)) texts.push(text);
+  }
+  return texts;
+}, { clip, source });
+
 /** Screenshots as WebP, of what the documents show: a part of a page, from the top of one element to the
- * bottom of another one. */
+ * bottom of another one; of other pages the first screen. */
 async function take(browser, into) {
   tutorial();
   const MARGIN = 5;
-  for (const [file, viewport, scheme, first, last] of [
-    ["report-diagnosis.webp", WIDE, "light", "header .badge, h1", ".tiles"],
-    ["report-path.webp", WIDE, "light", "figure.path h3", "figure.path canvas"],
-    ["report-residuals.webp", WIDE, "light", "#residuals figure:last-of-type", "#residuals figure:last-of-type"],
-    ["report-next.webp", WIDE, "light", "#next h2", "#next table"],
-    ["report-narrow.webp", NARROW, "dark", "header .badge, h1", ".tiles"],
+  const others = Object.keys(OTHER_PAGES).map((name) => [`report-${name}.webp`, name, WIDE, "light", 70]);
+  const shown = {};
+  for (const [file, name, viewport, scheme, quality, first, last] of [
+    ["report-diagnosis.webp", "diagnosis", WIDE, "light", 80, "header .badge, h1", ".tiles"],
+    ["report-path.webp", "diagnosis", WIDE, "light", 80, "figure.path h3", "figure.path canvas"],
+    ["report-residuals.webp", "diagnosis", WIDE, "light", 80, "#residuals figure:last-of-type", "#residuals figure:last-of-type"],
+    ["report-next.webp", "diagnosis", WIDE, "light", 80, "#next h2", "#next table"],
+    ["report-narrow.webp", "diagnosis", NARROW, "dark", 80, "header .badge, h1", ".tiles"],
+    ...others,
   ]) {
-    const { context, page } = await opened(browser, "diagnosis", viewport, scheme);
-    const clip = await page.evaluate(([first, last, margin]) => {
+    const { context, page } = await opened(browser, name, viewport, scheme);
+    const clip = first ? await page.evaluate(([first, last, margin]) => {
       const [from, to] = [first, last].map((selector) => document.querySelector(selector).getBoundingClientRect());
       const x = Math.max(0, Math.min(from.left, to.left) - margin), y = Math.max(0, from.top + window.scrollY - margin);
       const width = Math.max(from.right, to.right) + margin - x;
       return { x, y, width, height: to.bottom + window.scrollY + margin - y, scale: 1 };
-    }, [first, last, MARGIN]);
+    }, [first, last, MARGIN]) : { x: 0, y: 0, ...viewport, scale: 1 };
     const session = await context.newCDPSession(page);
-    const { data } = await session.send("Page.captureScreenshot", { format: "webp", quality: 80, clip, captureBeyondViewport: true });
+    const { data } = await session.send("Page.captureScreenshot", { format: "webp", quality, clip, captureBeyondViewport: true });
     writeFileSync(join(into, file), Buffer.from(data, "base64"));
-    console.log(`${file}: ${statSync(join(into, file)).size} bytes`);
+    shown[file] = { page: name, command: OTHER_PAGES[name] ? `yair ${OTHER_PAGES[name]}` : "docs/tutorial.md", texts: await shownTexts(page, clip, readFileSync(join(work, name, "report.html"), "utf8")) };
+    console.log(`${file}: ${statSync(join(into, file)).size} bytes, ${shown[file].texts.length} texts`);
     await context.close();
   }
-  for (const name of otherPages()) {
-    const { context, page } = await opened(browser, name, WIDE, "light");
-    const session = await context.newCDPSession(page);
-    const { data } = await session.send("Page.captureScreenshot", { format: "webp", quality: 70 });
-    const file = `report-${name}.webp`;
-    writeFileSync(join(into, file), Buffer.from(data, "base64"));
-    console.log(`${file}: ${statSync(join(into, file)).size} bytes`);
-    await context.close();
-  }
+  writeFileSync(join(into, SHOWN), `${JSON.stringify(shown, null, 1)}\n`);
 }
 
 /** Every page as PNG, to be looked at. */

@@ -33,7 +33,7 @@ fn an_evaluation_is_drawn_and_names_of_runs_stay_text() {
     let page = page(&at.join("page"));
     assert!(!page.contains("<script>alert") && page.contains("&#60;script&#62;alert"));
     // 0.02 m beside after a metre.
-    assert!(page.contains("2.000 %") && page.contains("yair evaluate set --out-dir page"));
+    assert!(page.contains("2.000\u{a0}%") && page.contains("yair evaluate set --out-dir page"));
     // A second time the page is replaced.
     succeed(at, &["evaluate", "set", "--out-dir", "page"]);
     assert_eq!(fs::read_dir(at.join("page")).expect("there").count(), 1);

@@ -43,7 +43,7 @@ fn a_report_shows_what_was_found() {
         "radius varies by 0.30",
         "± ",
         "makes no measurable difference to the drift",
-        "circles with a radius of",
+        "Circles with a radius of",
     ] {
         assert!(first_screen.contains(part), "no {part}: {first_screen}");
     }

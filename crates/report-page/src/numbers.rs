@@ -26,7 +26,11 @@ pub(crate) fn rounded(value: f64, digits: usize) -> Value {
     value.is_finite().then(short).flatten().map_or(Value::Null, |value| json!(value))
 }
 
-/// Hyphens before numbers, and in their exponents, as minus signs. Hyphens in names, dates and words stay.
+/// Units that stay on the line of their number.
+const UNITS: [&str; 10] = ["%", "°", "m", "mm", "s", "ms", "min", "rad", "mrad", "m/s"];
+
+/// Hyphens before numbers, and in their exponents, as minus signs; no line is broken between a number and its
+/// unit. Hyphens in names, dates and words stay.
 pub(crate) fn typeset(text: &str) -> String {
     let characters: Vec<char> = text.chars().collect();
     let is_digit = |at: usize| characters.get(at).is_some_and(char::is_ascii_digit);
@@ -48,7 +52,16 @@ pub(crate) fn typeset(text: &str) -> String {
         let before_number = is_digit(at + 1) || characters.get(at + 1) == Some(&'.') && is_digit(at + 2);
         characters[at] == '-' && before_number && (begins(at) || is_exponent(at))
     };
-    (0..characters.len()).map(|at| if sign(at) { '−' } else { characters[at] }).collect()
+    let before_unit = |at: usize| {
+        let word = characters[at + 1..].iter().take_while(|c| c.is_alphabetic() || "%°/".contains(**c));
+        characters[at] == ' ' && at > 0 && is_digit(at - 1) && UNITS.contains(&word.collect::<String>().as_str())
+    };
+    let typeset = |at: usize| match characters[at] {
+        _ if sign(at) => '−',
+        _ if before_unit(at) => '\u{a0}',
+        other => other,
+    };
+    (0..characters.len()).map(typeset).collect()
 }
 
 #[cfg(test)]
@@ -56,12 +69,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn minus_signs_stand_before_numbers_and_hyphens_stay_in_names() {
+    fn minus_signs_are_before_numbers_and_units_on_their_lines() {
         let cases = [
-            ("-6.5 % to +8 %", "−6.5 % to +8 %"),
+            ("-6.5 % to +8 %", "−6.5\u{a0}% to +8\u{a0}%"),
+            ("2 m by 1.8 m/s, 3 metres, run 7 min", "2\u{a0}m by 1.8\u{a0}m/s, 3 metres, run 7\u{a0}min"),
             ("-1.2e-6 ± 3e-7 (-.5)", "−1.2e−6 ± 3e−7 (−.5)"),
             ("run-01 of 2020-06-12, x-1e-3, --room, a1e-5", "run-01 of 2020-06-12, x-1e-3, --room, a1e-5"),
-            ("clock - 3 s, 95 %-interval, 13-8", "clock - 3 s, 95 %-interval, 13-8"),
+            ("clock - 3 s, 95 %-interval, 13-8", "clock - 3\u{a0}s, 95\u{a0}%-interval, 13-8"),
             ("z = -4.0; <-1", "z = −4.0; <−1"),
             ("", ""),
         ];
