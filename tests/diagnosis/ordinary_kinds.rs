@@ -8,8 +8,8 @@ pub(crate) fn robots() -> (u64, u64) {
     (number("YAIR_ROBOTS").unwrap_or(1), number("YAIR_SEED").unwrap_or(500))
 }
 
-/// Of every so many rows of a table one is asked where neither YAIR_ROBOTS nor YAIR_KIND is set: `.ci/run replay`
-/// draws all kinds, and a campaign asks all.
+/// One row in two of a table is asked where neither YAIR_ROBOTS nor YAIR_KIND is set: `.ci/run replay` draws
+/// all kinds, and a campaign asks all.
 pub(crate) const HALF: usize = 2;
 /// The same where a row costs seconds.
 pub(crate) const QUARTER: usize = 4;
