@@ -88,11 +88,17 @@ impl<'d> FirstScreen<'d> {
             (None, Some(sentence)) => sentence,
             (None, None) => "Nothing is wrong with the odometry, as far as these runs can show.".to_owned(),
             (Some(first), Some(sentence)) if self.calibration_removes_more() => {
-                format!("{sentence} What is left: {}.", words::cause_in_a_sentence(first))
+                let likely = if is_certain(first) { "" } else { ", most likely" };
+                format!("{sentence} What is left{likely}: {}.", words::cause_in_a_sentence(first))
             }
             (Some(first), _) => {
                 let size = words::size(first).map_or_else(String::new, |size| format!(": {size}"));
-                format!("{}{size}.", capitalised(&words::cause_in_a_sentence(first)))
+                let cause = words::cause_in_a_sentence(first);
+                if is_certain(first) {
+                    format!("{}{size}.", capitalised(&cause))
+                } else {
+                    format!("Most likely {cause}{size}.")
+                }
             }
         }
     }
@@ -206,6 +212,11 @@ impl<'d> FirstScreen<'d> {
         let size = words::size(first).unwrap_or_else(|| format!("probability {:.0} %", 100.0 * first.probability));
         tile(LABEL, capitalised(words::cause(first)), format!("{size}{further}"), "finding")
     }
+}
+
+/// Whether a finding has one name, be it that of no known cause.
+fn is_certain(finding: &Finding) -> bool {
+    finding.names.len() == 1
 }
 
 fn tile(label: &str, value: String, note: String, section: &str) -> Tile {

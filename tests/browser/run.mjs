@@ -252,8 +252,8 @@ const FIRST_SCREENS = {
   // The instrument's clock is no headline.
   instrument: { drift: 3, headline: /^Calibrate the wheels first/, not: /late|timestamp/, measurement: /^The instrument's timestamps are late/, id: "truth_latency" },
   unlisted: { drift: 3, headline: /^Calibrate the wheels first/, badge: "Cause not certain" },
-  june: { drift: 3, headline: /the faster the robot turns, the nearer together its wheels act\.$/, cause: /nearer together/, badge: "Cause not certain", id: "turn_rate_wheelbase" },
-  kobuki: { drift: 2, one: true, headline: /./, not: /mounted at an angle/, measurement: /^The instrument is mounted at an angle/, id: "truth_yaw" },
+  june: { drift: 3, headline: /What is left, most likely: the faster the robot turns, the nearer together its wheels act\.$/, cause: /nearer together/, badge: "Cause not certain", id: "turn_rate_wheelbase" },
+  kobuki: { drift: 2, one: true, headline: /^Most likely a wheel slides under hard acceleration\.$/, not: /mounted at an angle/, measurement: /^The instrument is mounted at an angle/, id: "truth_yaw" },
 };
 
 /** The first screen of a diagnosis by content: what the page says against what the JSON document says. */

@@ -15,6 +15,9 @@ pub(crate) struct Arguments {
     /// Folders of more logs, with an answer.json beside each.
     #[arg(long, value_name = "DIR", num_args = 1..)]
     pub(crate) corpus: Vec<PathBuf>,
+    /// The folder of real robots' logs: the `yair` beside this program imports them.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) real: Option<PathBuf>,
     /// Cases of the blind benchmark for each seed; 0 for none.
     #[arg(long, value_name = "N", default_value_t = 800)]
     pub(crate) cases: u64,

@@ -14,6 +14,7 @@ mod measure;
 mod outcome;
 mod paired;
 mod plain;
+mod real;
 mod table;
 
 pub use answer::{Answer, Cause, Question};
@@ -24,4 +25,5 @@ pub use measure::{MEASURES, Measure, Score};
 pub use outcome::{Drift, Finding, Outcome, Stated, drift};
 pub use paired::{Paired, Verdict, mcnemar};
 pub use plain::{kind_name, mixed_name, write_kind, write_mixed};
+pub use real::write_real;
 pub use table::{Comparison, Level, Spread, Stored};

@@ -15,7 +15,7 @@ use arguments::Arguments;
 use clap::Parser;
 use draws::{Draw, draws};
 use rayon::prelude::*;
-use replay::{Build, Comparison, Log, Outcome, Stored, counts};
+use replay::{Build, Comparison, Log, Outcome, Stored, counts, write_real};
 
 fn main() -> ExitCode {
     match run(&Arguments::parse()) {
@@ -73,11 +73,16 @@ fn logs(arguments: &Arguments) -> Result<Vec<Log>, Box<dyn Error>> {
     let mut logs = if draws.is_empty() { Vec::new() } else { Log::all(&drawn)? };
     let asked: BTreeSet<String> = draws.iter().map(Draw::name).collect();
     logs.retain(|log| asked.contains(&log.name));
+    if let Some(data) = &arguments.real {
+        let real = arguments.store.join("real");
+        write_real(&real, data)?;
+        logs.extend(Log::all(&real)?);
+    }
     for corpus in &arguments.corpus {
         logs.extend(Log::all(corpus)?);
     }
     if logs.is_empty() {
-        return Err("no logs: every number is 0, and no --corpus is given".into());
+        return Err("no logs: every number is 0, and neither --real nor --corpus is given".into());
     }
     Ok(logs)
 }

@@ -27,10 +27,10 @@ pub(crate) fn rounded(value: f64, digits: usize) -> Value {
 }
 
 /// Units that stay on the line of their number.
-const UNITS: [&str; 10] = ["%", "°", "m", "mm", "s", "ms", "min", "rad", "mrad", "m/s"];
+const UNITS: [&str; 11] = ["%", "°", "°/s", "m", "mm", "s", "ms", "min", "rad", "mrad", "m/s"];
 
 /// Hyphens before numbers, and in their exponents, as minus signs; no line is broken between a number and its
-/// unit. Hyphens in names, dates and words stay.
+/// unit, and no space is before a degree's sign. Hyphens in names, dates and words stay.
 pub(crate) fn typeset(text: &str) -> String {
     let characters: Vec<char> = text.chars().collect();
     let is_digit = |at: usize| characters.get(at).is_some_and(char::is_ascii_digit);
@@ -57,11 +57,11 @@ pub(crate) fn typeset(text: &str) -> String {
         characters[at] == ' ' && at > 0 && is_digit(at - 1) && UNITS.contains(&word.collect::<String>().as_str())
     };
     let typeset = |at: usize| match characters[at] {
-        _ if sign(at) => '−',
-        _ if before_unit(at) => '\u{a0}',
-        other => other,
+        _ if sign(at) => Some('−'),
+        _ if before_unit(at) => (characters[at + 1] != '°').then_some('\u{a0}'),
+        other => Some(other),
     };
-    (0..characters.len()).map(typeset).collect()
+    (0..characters.len()).filter_map(typeset).collect()
 }
 
 #[cfg(test)]
@@ -73,6 +73,7 @@ mod tests {
         let cases = [
             ("-6.5 % to +8 %", "−6.5\u{a0}% to +8\u{a0}%"),
             ("2 m by 1.8 m/s, 3 metres, run 7 min", "2\u{a0}m by 1.8\u{a0}m/s, 3 metres, run 7\u{a0}min"),
+            ("104.7 ± 0.1 ° to the right, 3 °/s, heading, °", "104.7 ± 0.1° to the right, 3°/s, heading, °"),
             ("-1.2e-6 ± 3e-7 (-.5)", "−1.2e−6 ± 3e−7 (−.5)"),
             ("run-01 of 2020-06-12, x-1e-3, --room, a1e-5", "run-01 of 2020-06-12, x-1e-3, --room, a1e-5"),
             ("clock - 3 s, 95 %-interval, 13-8", "clock - 3\u{a0}s, 95\u{a0}%-interval, 13-8"),
