@@ -80,7 +80,9 @@ fn manoeuvre(schedule: &Schedule) -> String {
             if turns < 1.0 {
                 format!("Spins of {:.0}°", 360.0 * turns)
             } else {
-                format!("Spins of {turns:.3} turns").replace(".000", "")
+                let turns = format!("{turns:.3}").replace(".000", "");
+                let plural = if turns == "1" { "" } else { "s" };
+                format!("Spins of {turns} turn{plural}")
             }
         }
         Schedule::Squares { side_m, .. } => format!("Squares with sides of {side_m:.1} m"),
