@@ -264,7 +264,7 @@ fn base_m(at: &Path, name: &str) -> [f64; 2] {
 }
 
 #[test]
-#[ignore = "a campaign of a minute, not a test: docs/dataset.md has its command"]
+#[ignore = "a campaign of a minute, not a test: docs/import.md has its command"]
 #[expect(clippy::print_stdout, reason = "its sessions are what it is for")]
 fn wall_campaign() {
     let temp = tempfile::tempdir().expect("a folder");

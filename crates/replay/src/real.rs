@@ -1,5 +1,5 @@
-//! Logs of real robots, which are no part of the repository: the `yair` beside this program imports them. What
-//! is wrong with such a robot nobody knows; how far its models drift in other sessions is measured.
+//! Logs of real robots, which are no part of the repository: the `yair` beside this program imports them.
+//! What is wrong with such a robot nobody knows; the drift of its models in other sessions is measured.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -10,7 +10,8 @@ use std::process::{Command, Stdio};
 use crate::answer::{Answer, Question};
 use crate::corpus::ANSWER;
 
-/// A session: the words of `yair import` without `--out`; names of files begin with `@`, below the data's folder.
+/// A session: the words of `yair import` without `--out`; names of files begin with `@`, below the data's
+/// folder.
 type Session = Vec<String>;
 
 /// A log: its robot, its name, the session that is diagnosed, and those driven elsewhere.
