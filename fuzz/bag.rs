@@ -103,22 +103,30 @@ pub(crate) fn number(body: &mut [u8], random: &mut impl Rng) {
     }
 }
 
+/// Two places of a list that is not empty. Declarations are at its front and matter most: the first place is
+/// among them more often than by chance.
+pub(crate) fn places(count: usize, random: &mut impl Rng) -> [usize; 2] {
+    let first = if random.random_bool(0.3) { count.min(6) } else { count };
+    [first, count].map(|count| random.random_range(0..count))
+}
+
+/// Removes, repeats or exchanges a record, or ends the list at it, by one of the numbers 0 to 3.
+pub(crate) fn rearrange<T: Clone>(records: &mut Vec<T>, [at, other]: [usize; 2], how: u32) {
+    match how {
+        0 => drop(records.remove(at)),
+        1 => records.insert(other, records[at].clone()),
+        2 => records.swap(at, other),
+        _ => records.truncate(at + 1),
+    }
+}
+
 fn mutate(records: &mut Vec<Record>, random: &mut impl Rng) {
     if records.is_empty() {
         return;
     }
-    let at = if random.random_bool(0.3) {
-        // Declarations stand at the front and matter most.
-        random.random_range(0..records.len().min(6))
-    } else {
-        random.random_range(0..records.len())
-    };
-    let other = random.random_range(0..records.len());
+    let [at, other] = places(records.len(), random);
     match random.random_range(0..9) {
-        0 => drop(records.remove(at)),
-        1 => records.insert(other, records[at].clone()),
-        2 => records.swap(at, other),
-        3 => records.truncate(at + 1),
+        how @ 0..4 => rearrange(records, [at, other], how),
         4 => {
             let length = random.random_range(0..=records[at].1.len());
             records[at].1.truncate(length);

@@ -60,19 +60,10 @@ fn mutate(records: &mut Vec<Record>, random: &mut impl Rng) {
     if records.is_empty() {
         return;
     }
-    let at = if random.random_bool(0.3) {
-        // Connections stand at the front and matter most.
-        random.random_range(0..records.len().min(6))
-    } else {
-        random.random_range(0..records.len())
-    };
-    let other = random.random_range(0..records.len());
+    let [at, other] = bag::places(records.len(), random);
     let part = usize::from(random.random_bool(0.7));
     match random.random_range(0..9) {
-        0 => drop(records.remove(at)),
-        1 => records.insert(other, records[at].clone()),
-        2 => records.swap(at, other),
-        3 => records.truncate(at + 1),
+        how @ 0..4 => bag::rearrange(records, [at, other], how),
         4 => {
             let length = random.random_range(0..=records[at][part].len());
             records[at][part].truncate(length);

@@ -120,7 +120,7 @@ pub struct GroupInstrument {
 }
 
 impl GroupInstrument {
-    /// One of which nothing is known.
+    /// An instrument without known values.
     pub(crate) fn new(of: &str) -> Self {
         Self { of: of.to_owned(), sensor_x_m: None, sensor_y_m: None, sensor_theta_rad: None, latency_s: None }
     }
@@ -257,11 +257,6 @@ impl Calibration {
     /// kind.
     #[must_use]
     pub fn plausibility_warnings(&self, robot: &NominalRobot) -> Vec<String> {
-        let nominal = [
-            (Parameter::LeftWheelDiameter, robot.left_wheel_diameter_m),
-            (Parameter::RightWheelDiameter, robot.right_wheel_diameter_m),
-            (Parameter::WheelSeparation, robot.wheel_separation_m),
-        ];
         let remark = |(parameter, nominal): (Parameter, f64)| {
             let factor = self.estimate(parameter)?.value / nominal;
             let cause = "look for a wrong ticks_per_rev, a wrapping counter, swapped wheels or a unit";
@@ -269,17 +264,12 @@ impl Calibration {
             let message = || format!("{} is {times} times its nominal value: {cause}", parameter.key());
             is_implausible(parameter, factor).then(message)
         };
-        nominal.into_iter().filter_map(remark).collect()
+        stated_lengths(robot).into_iter().filter_map(remark).collect()
     }
 
     /// Remarks on lengths that are far from the stated ones and may be right.
     #[must_use]
     pub fn remarks(&self, robot: &NominalRobot) -> Vec<String> {
-        let stated = [
-            (Parameter::LeftWheelDiameter, robot.left_wheel_diameter_m),
-            (Parameter::RightWheelDiameter, robot.right_wheel_diameter_m),
-            (Parameter::WheelSeparation, robot.wheel_separation_m),
-        ];
         let remark = |(parameter, stated_m): (Parameter, f64)| {
             let is_open = self.not_observable.iter().any(|blind| blind.parameter == parameter);
             let factor = self.estimate(parameter)?.value / stated_m;
@@ -292,7 +282,7 @@ impl Calibration {
             };
             (is_far && !is_open).then(|| format!("{} is {factor:.3} times the stated one: {readings}", parameter.key()))
         };
-        stated.into_iter().filter_map(remark).chain(self.seen.clone()).collect()
+        stated_lengths(robot).into_iter().filter_map(remark).chain(self.seen.clone()).collect()
     }
 
     /// Every value that the method has.
@@ -300,6 +290,15 @@ impl Calibration {
         let all = Parameter::ESTIMATED.into_iter().chain(Parameter::EXTRINSICS);
         all.chain([Parameter::Latency]).filter_map(|parameter| self.estimate(parameter))
     }
+}
+
+/// The lengths that a robot states, metres.
+fn stated_lengths(robot: &NominalRobot) -> [(Parameter, f64); 3] {
+    [
+        (Parameter::LeftWheelDiameter, robot.left_wheel_diameter_m),
+        (Parameter::RightWheelDiameter, robot.right_wheel_diameter_m),
+        (Parameter::WheelSeparation, robot.wheel_separation_m),
+    ]
 }
 
 /// Whether a length is no correction of its nominal value, by the ratio of the two.

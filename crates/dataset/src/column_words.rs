@@ -1,4 +1,4 @@
-//! Words of which the names of columns are made, in English and German.
+//! Words in the names of columns, in English and German.
 
 /// The robot's own estimate.
 pub(crate) const OWN: &[&str] =

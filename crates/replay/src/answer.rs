@@ -1,8 +1,13 @@
 //! What is true of a log: `answer.json` beside it.
 
 use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
+
+/// The name of the file with the answer.
+pub const ANSWER: &str = "answer.json";
 
 /// What a log asks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -69,6 +74,29 @@ pub struct Answer {
 }
 
 impl Answer {
+    /// The answer of a log with nothing wrong that is known.
+    pub(crate) fn new(corpus: &str, question: Question, seed: u64) -> Self {
+        Self {
+            corpus: corpus.to_owned(),
+            question,
+            causes: Vec::new(),
+            exempt: Vec::new(),
+            without: Vec::new(),
+            geometry_m: BTreeMap::new(),
+            seed,
+            strata: BTreeMap::new(),
+        }
+    }
+
+    /// Writes the answer into a log's folder: last, so that a folder with an answer is whole.
+    pub(crate) fn write(&self, folder: &Path) -> Result<(), String> {
+        let file = folder.join(ANSWER);
+        let text = serde_json::to_vec_pretty(self).map_err(|error| error.to_string())?;
+        fs::create_dir_all(folder)
+            .and_then(|()| atomic_file::write_whole(&file, &text))
+            .map_err(|error| format!("{}: {error}", file.display()))
+    }
+
     /// Whether one of a finding's names is right because of what is ordinary about the log, and of nothing
     /// that is wrong.
     #[must_use]

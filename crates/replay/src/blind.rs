@@ -8,8 +8,7 @@ use blind_benchmark::{CaseKind, CaseLogs, EffectKind, OracleView, Scope, case_lo
 use dataset::{Dataset, Existing};
 use kinematics::DriveGeometry;
 
-use crate::answer::{Answer, Cause, Question, geometry_m};
-use crate::corpus::ANSWER;
+use crate::answer::{ANSWER, Answer, Cause, Question, geometry_m};
 
 /// The folder of a case below a corpus.
 #[must_use]
@@ -31,7 +30,7 @@ pub fn write(corpus: &Path, seed: u64, number: u64) -> Result<(), String> {
     write_log(&folder, &answer(&logs, seed), &logs.sessions, &logs.elsewhere)
 }
 
-/// Writes a log; its answer last, so that a folder with an answer is whole.
+/// Writes a log.
 fn write_log(folder: &Path, answer: &Answer, training: &[Dataset], held_out: &[Dataset]) -> Result<(), String> {
     for (part, sessions) in [("training", training), ("held_out", held_out)] {
         for (number, session) in sessions.iter().enumerate() {
@@ -40,9 +39,7 @@ fn write_log(folder: &Path, answer: &Answer, training: &[Dataset], held_out: &[D
             dataset::write(session, &dir, Existing::ReplaceDataset).map_err(|error| error.to_string())?;
         }
     }
-    let text = serde_json::to_vec_pretty(answer).map_err(|error| error.to_string())?;
-    let file = folder.join(ANSWER);
-    atomic_file::write_whole(&file, &text).map_err(|error| format!("{}: {error}", file.display()))
+    answer.write(folder)
 }
 
 fn answer(logs: &CaseLogs, seed: u64) -> Answer {

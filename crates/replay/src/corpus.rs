@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
-use crate::answer::Answer;
+use crate::answer::{ANSWER, Answer};
 
 /// A log of a corpus.
 #[derive(Debug, Clone)]
@@ -22,9 +22,6 @@ pub struct Log {
     /// SHA-256 of every file of its sessions, with their names.
     pub digest: String,
 }
-
-/// The name of the file with the answer.
-pub const ANSWER: &str = "answer.json";
 
 impl Log {
     /// Every log below a folder, in the order of their names.

@@ -17,10 +17,10 @@ mod plain;
 mod real;
 mod table;
 
-pub use answer::{Answer, Cause, Question};
+pub use answer::{ANSWER, Answer, Cause, Question};
 pub use blind::{name as blind_name, write as write_blind_case};
 pub use build::Build;
-pub use corpus::{ANSWER, Log, counts};
+pub use corpus::{Log, counts};
 pub use measure::{MEASURES, Measure, Score};
 pub use outcome::{Drift, Finding, Outcome, Stated, drift};
 pub use paired::{Paired, Verdict, mcnemar};

@@ -1,13 +1,11 @@
 //! Logs of [`plain_robot`] with their answers: kinds of ordinary logs, and mixed ones.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::Path;
 
 use plain_robot::{Kind, Mixed, PlainRobot};
 
-use crate::answer::{Answer, Cause, Question, geometry_m};
-use crate::corpus::ANSWER;
+use crate::answer::{ANSWER, Answer, Cause, Question, geometry_m};
 
 /// The folder of a robot of a kind below a corpus.
 #[must_use]
@@ -32,8 +30,11 @@ pub fn write_kind(corpus: &Path, kind: Kind, seed: u64, group: u64) -> Result<()
     let mut robot = PlainRobot::ordinary(seed);
     change(&mut robot);
     let strata = BTreeMap::from([("kind".to_owned(), name.to_owned())]);
-    let answer =
-        Answer { exempt: exempt.iter().map(|id| (*id).to_owned()).collect(), strata, ..null("ordinary", group) };
+    let answer = Answer {
+        exempt: exempt.iter().map(|id| (*id).to_owned()).collect(),
+        strata,
+        ..Answer::new("ordinary", Question::Null, group)
+    };
     write(&corpus.join(kind_name(kind, seed)), &robot, answer)
 }
 
@@ -45,35 +46,19 @@ pub fn write_mixed(corpus: &Path, seed: u64, group: u64) -> Result<(), String> {
     let Mixed { robot, exempt, fault, .. } = Mixed::drawn(seed);
     // How large a fault must be to be seen nobody has computed: none is plain.
     let cause = |fault: &str| Cause { right: vec![fault.to_owned()], ..Cause::default() };
+    let question = if fault.is_some() { Question::One } else { Question::Null };
     let answer = Answer {
-        question: if fault.is_some() { Question::One } else { Question::Null },
         causes: fault.map(cause).into_iter().collect(),
         exempt: exempt.into_iter().map(str::to_owned).collect(),
-        ..null("mixed", group)
+        ..Answer::new("mixed", question, group)
     };
     write(&corpus.join(mixed_name(seed)), &robot, answer)
 }
 
-fn null(corpus: &str, seed: u64) -> Answer {
-    Answer {
-        corpus: corpus.to_owned(),
-        question: Question::Null,
-        causes: Vec::new(),
-        exempt: Vec::new(),
-        without: Vec::new(),
-        geometry_m: BTreeMap::new(),
-        seed,
-        strata: BTreeMap::new(),
-    }
-}
-
 fn write(folder: &Path, robot: &PlainRobot, answer: Answer) -> Result<(), String> {
-    let file = folder.join(ANSWER);
-    if file.exists() {
+    if folder.join(ANSWER).exists() {
         return Ok(());
     }
     let geometry_m = geometry_m(robot.write(&folder.join("training/session_0")));
-    let text = serde_json::to_vec_pretty(&Answer { geometry_m, ..answer }).map_err(|error| error.to_string())?;
-    fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
-    atomic_file::write_whole(&file, &text).map_err(|error| format!("{}: {error}", file.display()))
+    Answer { geometry_m, ..answer }.write(folder)
 }

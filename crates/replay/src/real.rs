@@ -7,8 +7,7 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use crate::answer::{Answer, Question};
-use crate::corpus::ANSWER;
+use crate::answer::{ANSWER, Answer, Question};
 
 /// A session: the words of `yair import` without `--out`; names of files begin with `@`, below the data's
 /// folder.
@@ -113,18 +112,8 @@ pub fn write_real(corpus: &Path, data: &Path) -> Result<(), String> {
         for (number, session) in held_out.iter().enumerate() {
             import(&yair, data, session, &folder.join(format!("held_out/session_{number}")))?;
         }
-        let answer = Answer {
-            corpus: "real".to_owned(),
-            question: Question::Unknown,
-            causes: Vec::new(),
-            exempt: Vec::new(),
-            without: Vec::new(),
-            geometry_m: BTreeMap::new(),
-            seed: 0,
-            strata: BTreeMap::from([("robot".to_owned(), robot.to_owned())]),
-        };
-        let text = serde_json::to_vec_pretty(&answer).map_err(|error| error.to_string())?;
-        atomic_file::write_whole(&folder.join(ANSWER), &text).map_err(|error| format!("{name}: {error}"))?;
+        let strata = BTreeMap::from([("robot".to_owned(), robot.to_owned())]);
+        Answer { strata, ..Answer::new("real", Question::Unknown, 0) }.write(&folder)?;
     }
     Ok(())
 }

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use crate::embedded_json::embedded;
 use crate::numbers::{rounded, shown};
-use crate::path_picture::MAX_DRAWN_RUNS;
+use crate::path_picture::{Drawn, MAX_DRAWN_RUNS};
 use crate::role::Role;
 use crate::table::{Cell, Table};
 
@@ -48,13 +48,6 @@ pub struct ModelErrors {
     pub heading_rad: Vec<f64>,
 }
 
-/// Errors as they are drawn.
-pub(crate) struct DrawnErrors {
-    pub(crate) json: String,
-    pub(crate) table: Table,
-    pub(crate) share: String,
-}
-
 impl ErrorPicture {
     pub(crate) fn description(&self) -> String {
         let names: Vec<&str> = self.models.iter().map(|(name, _)| name.as_str()).collect();
@@ -65,7 +58,7 @@ impl ErrorPicture {
         )
     }
 
-    pub(crate) fn drawn(&self) -> DrawnErrors {
+    pub(crate) fn drawn(&self) -> Drawn {
         let runs = &self.runs[..self.runs.len().min(MAX_DRAWN_RUNS)];
         let each = (INSTANT_BUDGET / runs.len().max(1)).max(MIN_INSTANTS);
         let models: Vec<Value> =
@@ -100,7 +93,7 @@ impl ErrorPicture {
             format!("Drawn: {drawn} of {all} measured instants, evenly spaced.")
         };
         let json = embedded(&json!({ "models": models, "runs": data }));
-        DrawnErrors { json, table: self.table(), share }
+        Drawn { json, table: self.table(), share }
     }
 
     /// The largest error of every run.

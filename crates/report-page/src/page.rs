@@ -8,7 +8,7 @@ use crate::chart::Chart;
 use crate::content_policy::{SCRIPTS, STYLE, policy};
 use crate::error::PageError;
 use crate::error_picture::ErrorPicture;
-use crate::path_picture::PathPicture;
+use crate::path_picture::{Drawn, PathPicture};
 use crate::report::{Block, Report};
 use crate::table::{Cell, Table};
 
@@ -74,32 +74,18 @@ fn chart(chart: &Chart) -> askama::Result<String> {
 
 /// Paths as they stand in a page.
 fn paths(picture: &PathPicture) -> askama::Result<String> {
-    let drawn = picture.drawn();
-    PictureView {
-        kind: "path",
-        title: &picture.title,
-        caption: &picture.caption,
-        share: &drawn.share,
-        description: &picture.description(),
-        json: &drawn.json,
-        table: &drawn.table,
-    }
-    .render()
+    runs("path", &picture.title, &picture.caption, &picture.description(), &picture.drawn())
 }
 
 /// Errors along runs as they stand in a page.
 fn errors(picture: &ErrorPicture) -> askama::Result<String> {
-    let drawn = picture.drawn();
-    PictureView {
-        kind: "errors",
-        title: &picture.title,
-        caption: &picture.caption,
-        share: &drawn.share,
-        description: &picture.description(),
-        json: &drawn.json,
-        table: &drawn.table,
-    }
-    .render()
+    runs("errors", &picture.title, &picture.caption, &picture.description(), &picture.drawn())
+}
+
+/// A picture of runs that may be thinned.
+fn runs(kind: &'static str, title: &str, caption: &str, description: &str, drawn: &Drawn) -> askama::Result<String> {
+    let Drawn { share, json, table } = drawn;
+    PictureView { kind, title, caption, share, description, json, table }.render()
 }
 
 /// A picture that is there already, as a source of an image.

@@ -43,8 +43,8 @@ pub struct PathRun {
     pub marks: Vec<Point>,
 }
 
-/// Paths as they are drawn.
-pub(crate) struct DrawnPaths {
+/// Paths, or errors, of runs as they are drawn.
+pub(crate) struct Drawn {
     pub(crate) json: String,
     pub(crate) table: Table,
     /// How much of it is drawn, in words.
@@ -62,7 +62,7 @@ impl PathPicture {
         )
     }
 
-    pub(crate) fn drawn(&self) -> DrawnPaths {
+    pub(crate) fn drawn(&self) -> Drawn {
         let runs = &self.runs[..self.runs.len().min(MAX_DRAWN_RUNS)];
         let views: Vec<&[Vec<Point>]> = runs.iter().map(|run| run.tracks.as_slice()).collect();
         let kept = kept(&views, POINT_BUDGET);
@@ -99,7 +99,7 @@ impl PathPicture {
             "tracks": tracks,
             "runs": runs.iter().zip(&kept).map(run).collect::<Vec<Value>>(),
         }));
-        DrawnPaths { json, table: self.table(), share }
+        Drawn { json, table: self.table(), share }
     }
 
     /// Where runs end.

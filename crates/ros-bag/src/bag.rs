@@ -97,13 +97,13 @@ impl Bag {
             visit(whole, log_time_ns, message)
         };
         for file in &self.files {
+            let limit_bytes = expansion_limit_bytes(fs::metadata(file).map_or(0, |metadata| metadata.len()));
             if !self.has_compressed_messages {
-                visit_file(file, &mut visit, &mut losses)?;
+                visit_file(file, limit_bytes, &mut visit, &mut losses)?;
                 continue;
             }
             let mut faulty = 0_u64;
             let mut expanded_bytes = 0;
-            let limit_bytes = expansion_limit_bytes(fs::metadata(file).map_or(0, |metadata| metadata.len()));
             let mut decompressed = |channel: &Channel, log_time_ns: u64, message: &[u8]| {
                 let whole = decompress("zstd", message);
                 expanded_bytes += whole.bytes.len() as u64;
@@ -116,7 +116,7 @@ impl Bag {
                 }
                 visit(channel, log_time_ns, &whole.bytes)
             };
-            visit_file(file, &mut decompressed, &mut losses)?;
+            visit_file(file, limit_bytes, &mut decompressed, &mut losses)?;
             if faulty > 0 {
                 losses.add(format!("{}: {faulty} messages could not be decompressed", file.display()));
             }
@@ -136,14 +136,14 @@ impl Bag {
 /// What visits messages: channel, time of receipt in nanoseconds, bytes.
 type Visit<'v> = &'v mut dyn FnMut(&Channel, u64, &[u8]) -> Result<(), RosBagError>;
 
-fn visit_file(file: &Path, visit: Visit<'_>, losses: &mut Losses) -> Result<(), RosBagError> {
+fn visit_file(file: &Path, limit_bytes: u64, visit: Visit<'_>, losses: &mut Losses) -> Result<(), RosBagError> {
     if ros1_file::is_ros1(file) {
-        return ros1_file::visit(file, visit, losses);
+        return ros1_file::visit(file, limit_bytes, visit, losses);
     }
     if sqlite_file::is_sqlite(file) {
         return sqlite_file::visit(file, visit, losses);
     }
-    mcap_file::visit(file, visit, losses)
+    mcap_file::visit(file, limit_bytes, visit, losses)
 }
 
 fn no_bag(path: &Path, why: &str) -> RosBagError {

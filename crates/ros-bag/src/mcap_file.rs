@@ -11,7 +11,7 @@ use std::path::Path;
 
 use ruzstd::decoding::StreamingDecoder;
 
-use crate::decompress::{decompress, expansion_limit_bytes};
+use crate::decompress::decompress;
 use crate::definition::ros2_name;
 use crate::error::RosBagError;
 use crate::mcap_records::{MAGIC, op};
@@ -65,18 +65,9 @@ impl Losses {
     }
 }
 
-/// Visits the messages of a file: channel, time of receipt in nanoseconds, bytes.
+/// Visits the messages of a file, with so many bytes at most by decompression: channel, time of receipt in
+/// nanoseconds, bytes.
 pub(crate) fn visit(
-    path: &Path,
-    visit: impl FnMut(&Channel, u64, &[u8]) -> Result<(), RosBagError>,
-    losses: &mut Losses,
-) -> Result<(), RosBagError> {
-    let file_bytes = std::fs::metadata(path).map_or(0, |metadata| metadata.len());
-    visit_within(path, expansion_limit_bytes(file_bytes), visit, losses)
-}
-
-/// As [`visit`], with so many bytes at most by decompression.
-fn visit_within(
     path: &Path,
     limit_bytes: u64,
     visit: impl FnMut(&Channel, u64, &[u8]) -> Result<(), RosBagError>,
@@ -437,7 +428,7 @@ mod tests {
         };
         std::fs::write(&path, bytes).expect("written");
         let mut losses = Losses::default();
-        visit_within(&path, limit_bytes, |_, _, _| Ok(()), &mut losses).map(|()| losses.lines())
+        visit(&path, limit_bytes, |_, _, _| Ok(()), &mut losses).map(|()| losses.lines())
     }
 
     const END: [u8; 9] = [op::DATA_END, 0, 0, 0, 0, 0, 0, 0, 0];

@@ -10,7 +10,7 @@ use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
-use crate::decompress::{decompress, expansion_limit_bytes};
+use crate::decompress::decompress;
 use crate::definition::ros2_name;
 use crate::error::RosBagError;
 use crate::mcap_file::{Channel, Losses, expands_beyond};
@@ -31,18 +31,9 @@ pub(crate) fn is_ros1(path: &Path) -> bool {
     File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == *NAME
 }
 
-/// Visits the messages of a file: channel, time of receipt in nanoseconds, bytes.
+/// Visits the messages of a file, with so many bytes at most by decompression: channel, time of receipt in
+/// nanoseconds, bytes.
 pub(crate) fn visit(
-    path: &Path,
-    visit: impl FnMut(&Channel, u64, &[u8]) -> Result<(), RosBagError>,
-    losses: &mut Losses,
-) -> Result<(), RosBagError> {
-    let file_bytes = std::fs::metadata(path).map_or(0, |metadata| metadata.len());
-    visit_within(path, expansion_limit_bytes(file_bytes), visit, losses)
-}
-
-/// As [`visit`], with so many bytes at most by decompression.
-fn visit_within(
     path: &Path,
     limit_bytes: u64,
     visit: impl FnMut(&Channel, u64, &[u8]) -> Result<(), RosBagError>,
@@ -323,7 +314,7 @@ mod tests {
             times_ns.push(time_ns);
             Ok(())
         };
-        visit_within(&path, limit_bytes, each, &mut losses)?;
+        visit(&path, limit_bytes, each, &mut losses)?;
         Ok((times_ns, losses.lines().join("\n")))
     }
 

@@ -248,7 +248,7 @@ fn read_two(bag: &Bag, pair: &WheelPair, resampling: Resampling, others: Others<
 /// What is beside the wheels, and what was lost.
 struct Visited {
     truth: Option<Rows<TruthReading>>,
-    /// The transforms of a chain, of which the poses are still to be made.
+    /// The transforms of a chain whose poses are not computed yet.
     moved: Option<Moved>,
     gyro: Option<GyroRows>,
     losses: Vec<String>,
