@@ -70,7 +70,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let beside = out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let unwritable = |error: std::io::Error| format!("{}: {}", out.display(), error.kind());
     let _new = NewFolders::to(out);
-    std::fs::create_dir_all(beside).map_err(unwritable)?;
+    atomic_file::create_all(beside).map_err(unwritable)?;
     let waiting = WorkFolder::beside(beside).map_err(unwritable)?;
     let mut files = Files { waiting: waiting.made(), written: Vec::new() };
     let mut datasets = Vec::with_capacity(paths.len());
@@ -120,7 +120,7 @@ impl Files<'_> {
     fn write(&mut self, file: PathBuf, text: &str) -> Result<(), Failure> {
         let path = self.waiting.join(&file);
         let folder = path.parent().unwrap_or(self.waiting);
-        let written = std::fs::create_dir_all(folder).and_then(|()| atomic_file::write_whole(&path, text.as_bytes()));
+        let written = atomic_file::create_all(folder).and_then(|()| atomic_file::write_whole(&path, text.as_bytes()));
         written.map_err(|error| format!("{}: {}", file.display(), error.kind()))?;
         self.written.push(file);
         Ok(())

@@ -180,7 +180,7 @@ fn folder_of(path: &Path) -> &Path {
 
 fn create_parents(path: &Path) -> Result<(), Failure> {
     let folder = folder_of(path);
-    std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()).into())
+    atomic_file::create_all(folder).map_err(|error| format!("{}: {error}", folder.display()).into())
 }
 
 /// Refuses a link in the place of a folder of results.
@@ -216,11 +216,11 @@ pub(crate) fn write_folder<T>(
     let is_there = target.is_dir();
     if target.exists() && (!is_there || target.read_dir().map_err(failed)?.next().is_some()) {
         refuse_filled(out, force)?;
-        std::fs::create_dir_all(out).map_err(failed)?;
+        atomic_file::create_all(out).map_err(failed)?;
         return write(out);
     }
     let folder = folder_of(&target);
-    std::fs::create_dir_all(folder).map_err(failed)?;
+    atomic_file::create_all(folder).map_err(failed)?;
     // The temporary folder's random name would tell the user nothing: only the kind of the error is shown.
     let work = WorkFolder::beside(folder).map_err(|error| format!("{}: {}", out.display(), error.kind()))?;
     // A file is named by the place that it is to have.

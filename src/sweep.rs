@@ -179,7 +179,7 @@ fn conclude(
         let mut bytes = serde_json::to_vec_pretty(result)?;
         bytes.push(b'\n');
         if let Some(folder) = path.parent() {
-            std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+            atomic_file::create_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
         }
         atomic_file::write_whole(path, &bytes).map_err(|error| format!("{}: {error}", path.display()))?;
         terminal.remark(&format!("baseline {} is written", path.display()));

@@ -275,6 +275,20 @@ mod tests {
         assert!(target.is_dir());
     }
 
+    #[test]
+    fn regress_no_folder_is_made_anew_that_was_taken_away() {
+        let temporary = tempfile::tempdir().expect("a folder");
+        let work = WorkFolder::beside(temporary.path()).expect("made");
+        let made = work.made().to_owned();
+        let taking_away = begun();
+        fs::remove_dir_all(work.folder.path()).expect("taken away");
+        let making = std::thread::spawn(move || crate::create_folder(&made));
+        std::thread::sleep(std::time::Duration::from_millis(50));
+        assert!(names(temporary.path()).is_empty(), "it is left when the process ends");
+        drop(taking_away);
+        making.join().expect("no panic").expect("made");
+    }
+
     #[cfg(unix)]
     #[test]
     fn links_with_such_a_name_lead_nowhere() {

@@ -57,6 +57,16 @@ pub fn read_at_most(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
 /// The system's, and [`io::ErrorKind::AlreadyExists`] where there is a link.
 pub fn create_folder(folder: &Path) -> io::Result<()> {
     refuse_link(folder)?;
+    create_all(folder)
+}
+
+/// Makes a folder with its parents; not while this process is being ended, as what is taken away then would
+/// be made anew.
+///
+/// # Errors
+/// The system's.
+pub fn create_all(folder: &Path) -> io::Result<()> {
+    let _begun = under_way::begun();
     std::fs::create_dir_all(folder)
 }
 

@@ -43,7 +43,7 @@ impl FolderLock {
         let in_use = || BenchError::InUse { path: folder.display().to_string() };
         atomic_file::refuse_link(folder)
             .map_err(|error| BenchError::Write { path: folder.display().to_string(), why: error.to_string() })?;
-        std::fs::create_dir_all(folder).map_err(unwritable)?;
+        atomic_file::create_all(folder).map_err(unwritable)?;
         for _ in 0..MAX_TURNS {
             let file = opened(&path).map_err(unwritable)?;
             let locked = file.try_lock();

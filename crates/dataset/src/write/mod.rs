@@ -123,7 +123,7 @@ impl Writer {
             Some(parent) if !parent.as_os_str().is_empty() => parent,
             _ => Path::new("."),
         };
-        fs::create_dir_all(parent).map_err(|source| io_error(parent, source))?;
+        atomic_file::create_all(parent).map_err(|source| io_error(parent, source))?;
         // The name of the folder under way would tell the user nothing: only the kind of the error is shown.
         let work = WorkFolder::beside(parent).map_err(|source| io_error(&target, io::Error::from(source.kind())))?;
         let (infos, ids, tables) = (Vec::new(), BTreeSet::new(), Default::default());
