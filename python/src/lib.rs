@@ -1,6 +1,8 @@
 //! `yair._yair`: the command and its datasets for Python. What a Python user meets is in `package/yair/`;
 //! here is what only Rust can do: running the command without the interpreter's lock, and columns from and to
 //! numpy.
+// PyO3 hands values over.
+#![allow(clippy::needless_pass_by_value)]
 
 mod columns;
 

@@ -1,61 +1,35 @@
-//! The Python package stands outside of the workspace, and is built of what the workspace is built of.
-
-use std::collections::BTreeMap;
-
-use toml::{Table, Value};
+//! The Python package is a member of the workspace that nothing else needs.
 
 use crate::text;
 
-fn toml(path: &str) -> Table {
-    text(path).parse().unwrap_or_else(|error| panic!("{path}: {error}"))
-}
-
-/// Versions of every package of a lock file.
-fn versions(path: &str) -> BTreeMap<String, Vec<String>> {
-    let lock = toml(path);
-    let text_of = |package: &Value, key: &str| package[key].as_str().expect("a text").to_owned();
-    let mut versions: BTreeMap<String, Vec<String>> = BTreeMap::new();
-    for package in lock["package"].as_array().expect("packages") {
-        versions.entry(text_of(package, "name")).or_default().push(text_of(package, "version"));
-    }
-    versions
-}
-
 /// The same numbers to the last bit need the same packages and the same profile; so does sharing what is
-/// built.
+/// built. Who builds the command needs no Python.
 #[test]
-fn python_is_built_of_the_packages_and_by_the_profiles_of_the_workspace() {
-    let (ours, theirs) = (versions("Cargo.lock"), versions("python/Cargo.lock"));
-    let differing: Vec<_> = theirs
-        .iter()
-        .filter(|(name, of)| ours.get(*name).is_some_and(|known| of.iter().all(|version| !known.contains(version))))
-        .collect();
-    assert!(theirs.len() > 100 && theirs.contains_key("pyo3"), "{} packages", theirs.len());
-    assert!(differing.is_empty(), "python/Cargo.lock has other versions than Cargo.lock: {differing:?}");
-    let (workspace, python) = (toml("Cargo.toml"), toml("python/Cargo.toml"));
-    let release = |manifest: &Table| {
-        let mut release = manifest["profile"]["release"].as_table().expect("a profile").clone();
-        (release.remove("package"), release)
-    };
-    let ((of_ours, ours), (of_theirs, theirs)) = (release(&workspace), release(&python));
-    assert_eq!(ours, theirs, "[profile.release] of Cargo.toml and of python/Cargo.toml");
-    // Packages that the Python package does not have may be missing there.
-    let (Some(Value::Table(of_ours)), Some(Value::Table(of_theirs))) = (of_ours, of_theirs) else {
-        panic!("no [profile.release.package]")
-    };
-    let locked = versions("python/Cargo.lock");
-    let expected: Table = of_ours.into_iter().filter(|(name, _)| locked.contains_key(name)).collect();
-    assert_eq!(expected, of_theirs, "[profile.release.package] of python/Cargo.toml");
-}
-
-#[test]
-fn python_has_the_workspaces_version_and_forbids_unsafe_code() {
-    let (workspace, python) = (toml("Cargo.toml"), toml("python/Cargo.toml"));
+fn python_is_built_with_the_workspace_and_nothing_is_built_of_it() {
+    let manifest = |path: &str| text(path).parse::<toml::Table>().unwrap_or_else(|error| panic!("{path}: {error}"));
+    let (workspace, python) = (manifest("Cargo.toml"), manifest("python/Cargo.toml"));
+    let is_of_workspace = |table: &toml::Value, key: &str| table[key]["workspace"].as_bool() == Some(true);
     for key in ["version", "edition", "rust-version", "license"] {
-        assert_eq!(python["package"][key], workspace["workspace"]["package"][key], "{key}");
+        assert!(is_of_workspace(&python["package"], key), "{key}");
     }
-    assert_eq!(python["lints"]["rust"]["unsafe_code"].as_str(), Some("forbid"));
-    assert_eq!(workspace["workspace"]["exclude"], Value::Array(vec!["python".into()]));
+    assert_eq!(python["lints"]["workspace"].as_bool(), Some(true));
+    assert!(
+        !python.contains_key("profile")
+            && !workspace["workspace"].as_table().expect("a table").contains_key("default-members")
+    );
+    let members = workspace["workspace"]["members"].as_array().expect("members");
+    assert!(members.iter().any(|member| member.as_str() == Some("python")));
+    let needs: Vec<&str> = python["dependencies"].as_table().expect("a table").keys().map(String::as_str).collect();
+    assert_eq!(needs, ["numpy", "pyo3", "yair"], "Python uses the front door alone");
+    // Everything that is built without --workspace.
+    let lock = manifest("Cargo.lock");
+    let packages = lock["package"].as_array().expect("packages");
+    let users = packages.iter().filter(|package| {
+        let needs = package.get("dependencies").and_then(toml::Value::as_array);
+        needs.is_some_and(|needs| needs.iter().any(|need| need.as_str() == Some("pyo3")))
+    });
+    let users: Vec<_> = users.map(|package| package["name"].as_str().expect("a name")).collect();
+    assert_eq!(users, ["numpy", "yair-python"]);
 }
 
 /// What tests in Python download is what was looked at once.

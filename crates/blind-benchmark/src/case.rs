@@ -8,11 +8,9 @@ use kinematics::DriveGeometry;
 use super::case_instrument::CaseInstrument;
 use super::case_kind::CaseKind;
 use super::conditions::Conditions;
-#[cfg(test)]
-use super::conditions::Stamps;
 use super::cut_log::{self, Stops};
 use super::draw::{CaseDraws, Draw};
-use super::drive::{DriveContext, HELD_OUT_RUN, OTHER_SESSION, PLANNED, drive, mean_square_motion};
+use super::drive::{DriveContext, HELD_OUT_RUN, OTHER_SESSION, PLANNED, Recorded, drive, mean_square_motion};
 use super::hidden::{EffectKind, Hidden, hideable};
 use super::instrument::InstrumentModel;
 use super::oracle::{Detectability, Hypotheses};
@@ -173,7 +171,8 @@ impl Case {
             CaseKind::Null | CaseKind::Single | CaseKind::LeftOut => SINGLE_RATIOS,
         };
         let weak = hidden.iter().any(|hidden| hidden.kind != EffectKind::RecordFault);
-        let plain = if weak { drive(&robot.sessions, &measurement, &[], false, 0)? } else { Vec::new() };
+        let plain =
+            if weak { drive(&robot.sessions, &measurement, &[], Recorded::WithoutNoise, 0)? } else { Vec::new() };
         let is_cut = case_kind == CaseKind::OneLog;
         let stops: Vec<Stops> = plain.iter().filter(|_| is_cut).map(cut_log::stops).collect();
         // An effect of one log is as large as the cut one shows it, where every run starts anew.
@@ -186,7 +185,10 @@ impl Case {
             let mut measured = |effect: &Hidden, noise: TrueNoise, hypotheses: Hypotheses<'_>| {
                 let driven = match last.take().filter(|(scale, _)| *scale == effect.scale) {
                     Some((_, driven)) => driven,
-                    None => cut_into_runs(drive(&robot.sessions, &measurement, &[effect], false, 0)?, &stops),
+                    None => cut_into_runs(
+                        drive(&robot.sessions, &measurement, &[effect], Recorded::WithoutNoise, 0)?,
+                        &stops,
+                    ),
                 };
                 let found = Detectability::of(&driven, &plain, &truth, noise, hypotheses);
                 last = Some((effect.scale, driven));
@@ -213,7 +215,7 @@ impl Case {
         }
         let all: Vec<&Hidden> = hidden.iter().collect();
         let both = if hidden.len() == 2 {
-            let exact = drive(&robot.sessions, &measurement, &all, false, 0)?;
+            let exact = drive(&robot.sessions, &measurement, &all, Recorded::WithoutNoise, 0)?;
             Detectability::of(&exact, &plain, &truth, noise, Hypotheses::All)
         } else {
             None
@@ -225,7 +227,7 @@ impl Case {
                 let mut view = view(effect, k, &detectability, both.as_ref(), &hidden);
                 view.rounding_share = rounding_shares[k].filter(|_| effect.kind == EffectKind::Mean);
                 if effect.kind == EffectKind::RecordFault {
-                    let driven = drive(&robot.sessions, &measurement, &[effect], false, 0)?;
+                    let driven = drive(&robot.sessions, &measurement, &[effect], Recorded::WithoutNoise, 0)?;
                     view.aliases = fault_aliases(effect.id, &driven, &truth, noise);
                 }
                 Ok(view)
@@ -233,9 +235,16 @@ impl Case {
             .collect::<Result<_, ChallengeError>>()?;
         let best = both.as_ref().or(detectability.first().and_then(Option::as_ref));
         let best_drive = best.map(Detectability::best_drive);
-        let datasets = drive(&robot.sessions, &measurement, &all, true, 0)?;
+        let datasets = drive(&robot.sessions, &measurement, &all, Recorded::AsLogged, 0)?;
         let log = |hidden: &[&Hidden]| -> Result<Option<Dataset>, ChallengeError> {
-            Ok(drive(std::slice::from_ref(&robot.held_out), &measurement, hidden, false, HELD_OUT_RUN)?.pop())
+            Ok(drive(
+                std::slice::from_ref(&robot.held_out),
+                &measurement,
+                hidden,
+                Recorded::WithoutNoise,
+                HELD_OUT_RUN,
+            )?
+            .pop())
         };
         let held_out = if weak { log(&all)?.zip(log(&[])?) } else { None };
         let mut held_out_random = Vec::new();
@@ -271,8 +280,8 @@ impl Case {
         let (Some(effect), Some(truth)) = (self.hidden.first(), self.truth()) else { return Ok(None) };
         let measurement = self.drive_context();
         let all = |hidden: &[&Hidden]| -> Result<Vec<Dataset>, ChallengeError> {
-            let mut all = drive(&self.robot.sessions, &measurement, hidden, false, 0)?;
-            all.extend(drive(plans, &measurement, hidden, false, PLANNED)?);
+            let mut all = drive(&self.robot.sessions, &measurement, hidden, Recorded::WithoutNoise, 0)?;
+            all.extend(drive(plans, &measurement, hidden, Recorded::WithoutNoise, PLANNED)?);
             Ok(all)
         };
         let Some(detectability) = Detectability::of(&all(&[effect])?, &all(&[])?, &truth, self.noise, Hypotheses::All)
@@ -280,7 +289,7 @@ impl Case {
             return Ok(None);
         };
         let rivals = detectability.rivals(effect.id, known_noncentrality(effect, &detectability));
-        Ok(Some(FurtherRuns { datasets: drive(plans, &measurement, &[effect], true, PLANNED)?, rivals }))
+        Ok(Some(FurtherRuns { datasets: drive(plans, &measurement, &[effect], Recorded::AsLogged, PLANNED)?, rivals }))
     }
 
     /// Its long logs cut into runs; none where that is not asked.
@@ -291,7 +300,19 @@ impl Case {
     /// The session on other paths, without noise.
     pub(crate) fn drive_elsewhere(&self) -> Result<Vec<Dataset>, ChallengeError> {
         let hidden: Vec<&Hidden> = self.hidden.iter().collect();
-        drive(std::slice::from_ref(&self.robot.other), &self.drive_context(), &hidden, false, OTHER_SESSION)
+        drive(
+            std::slice::from_ref(&self.robot.other),
+            &self.drive_context(),
+            &hidden,
+            Recorded::WithoutNoise,
+            OTHER_SESSION,
+        )
+    }
+
+    /// Its sessions, recorded as asked.
+    pub(crate) fn sessions(&self, recorded: Recorded) -> Result<Vec<Dataset>, ChallengeError> {
+        let hidden: Vec<&Hidden> = self.hidden.iter().collect();
+        drive(&self.robot.sessions, &self.drive_context(), &hidden, recorded, 0)
     }
 
     fn drive_context(&self) -> DriveContext<'_> {
@@ -392,91 +413,4 @@ fn scale(
 fn is_unresolved(effect: &Hidden, unrounded: &Detectability, noise: TrueNoise) -> bool {
     let largest = size_ratio(effect, unrounded) * effect.most / effect.scale;
     noise.has_rounding() && effect.kind == EffectKind::Mean && largest > 1.0
-}
-
-/// One robot driven again and again with an effect at the oracle's limit, for the oracle's own test.
-#[cfg(test)]
-pub(crate) struct Trial {
-    seed: u64,
-    conditions: Conditions,
-    robot: RandomRobot,
-    instrument_model: InstrumentModel,
-    hidden: Hidden,
-    noise: TrueNoise,
-    truth: DriveGeometry,
-    plain: Vec<Dataset>,
-    pub(crate) noncentrality: f64,
-}
-
-#[cfg(test)]
-impl Trial {
-    /// The first robot that shows the effect, in its catalogue's form, under white noise and many
-    /// measurements.
-    pub(crate) fn at_limit(seed: u64, id: &'static str) -> Result<Option<Self>, ChallengeError> {
-        for attempt in 0..200 {
-            let draws = CaseDraws { seed, case: 0, attempt };
-            let conditions = Conditions::draw(draws, Hidden::needs(id), &[id]);
-            let instrument_model = InstrumentModel::draw(draws, &conditions);
-            let robot = RandomRobot::draw(draws, &conditions, instrument_model.rate_hz, Hidden::needs(id))?;
-            let Some(mut hidden) = Hidden::draw(id, &robot, &mut draws.of("hidden")) else { continue };
-            let plainly = instrument_model.class == super::instrument::NoiseClass::White
-                && instrument_model.kind == super::instrument::TruthKind::Dense
-                && conditions.stamps == Stamps::Exact
-                && conditions.lost_row_share + conditions.clock_drift.abs() == 0.0;
-            if !plainly || hidden.other_form {
-                continue;
-            }
-            let truth = robot.sessions[0].scenario.true_geometry().map_err(sim_yair::SimulationError::from)?;
-            let measurement = DriveContext {
-                seed,
-                number: 0,
-                conditions: &conditions,
-                robot: &robot,
-                instrument_model: &instrument_model,
-                instrument: None,
-            };
-            let plain = drive(&robot.sessions, &measurement, &[], false, 0)?;
-            let noise = TrueNoise::of(&conditions, &instrument_model, mean_square_motion(&plain));
-            if noise.has_rounding() {
-                continue;
-            }
-            let mut noncentrality = 0.0;
-            for _ in 0..4 {
-                let exact = drive(&robot.sessions, &measurement, &[&hidden], false, 0)?;
-                let own = Hypotheses::One(hidden.id);
-                let Some(detectability) = Detectability::of(&exact, &plain, &truth, noise, own) else {
-                    return Ok(None);
-                };
-                noncentrality = detectability.noncentrality_in_form(hidden.id);
-                let off = size_ratio(&hidden, &detectability);
-                if (0.99..1.01).contains(&off) {
-                    break;
-                }
-                hidden.scale /= off;
-            }
-            return Ok(Some(Self {
-                seed,
-                conditions,
-                robot,
-                instrument_model,
-                hidden,
-                noise,
-                truth,
-                plain,
-                noncentrality,
-            }));
-        }
-        Ok(None)
-    }
-
-    /// The oracle's statistic on a drive with noise of its own, with the effect or without.
-    pub(crate) fn statistic(&self, number: u64, hidden: bool) -> Result<f64, ChallengeError> {
-        let Self { seed, conditions, robot, instrument_model, .. } = self;
-        let measurement = DriveContext { seed: *seed, number, conditions, robot, instrument_model, instrument: None };
-        let all = [&self.hidden];
-        let data = drive(&robot.sessions, &measurement, if hidden { &all } else { &[] }, true, 0)?;
-        let own = Hypotheses::One(self.hidden.id);
-        let detectability = Detectability::of(&data, &self.plain, &self.truth, self.noise, own);
-        Ok(detectability.map_or(0.0, |detectability| detectability.statistic(self.hidden.id)))
-    }
 }

@@ -39,16 +39,28 @@ pub(crate) struct DriveContext<'c> {
     pub(crate) instrument: Option<CaseInstrument>,
 }
 
-/// The sessions of a robot with hidden effects, with noise or without.
+/// How a drive is recorded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Recorded {
+    /// With noise, as the tool gets it.
+    AsLogged,
+    /// With noise of robot and instrument, but rows have the controllers' own counts and the instants at
+    /// which they were read, none is lost, and there is one clock.
+    OfTheWheels,
+    /// Without noise, likewise.
+    WithoutNoise,
+}
+
+/// The sessions of a robot with hidden effects.
 pub(crate) fn drive(
     plans: &[SessionPlan],
     case: &DriveContext<'_>,
     hidden: &[&Hidden],
-    noisy: bool,
+    recorded: Recorded,
     first_point: u32,
 ) -> Result<Vec<Dataset>, ChallengeError> {
     let ids: Vec<&str> = hidden.iter().map(|hidden| hidden.id).collect();
-    (first_point..).zip(plans).map(|(point, plan)| drive_session(plan, case, hidden, &ids, noisy, point)).collect()
+    (first_point..).zip(plans).map(|(point, plan)| drive_session(plan, case, hidden, &ids, recorded, point)).collect()
 }
 
 fn drive_session(
@@ -56,9 +68,10 @@ fn drive_session(
     case: &DriveContext<'_>,
     hidden: &[&Hidden],
     ids: &[&str],
-    noisy: bool,
+    recorded: Recorded,
     point: u32,
 ) -> Result<Dataset, ChallengeError> {
+    let noisy = recorded != Recorded::WithoutNoise;
     let mut scenario: Scenario = plan.scenario.clone();
     for instrument in &mut scenario.instruments {
         if let Instrument::MotionCapture { rate_hz, .. } = instrument {
@@ -74,12 +87,13 @@ fn drive_session(
     scenario.effects.extend(case.robot.harmless(ids));
     // Nothing is lost of the held-out log: in a gap nobody knows what was driven, whatever the model. Nor of
     // what the oracle sees.
-    let recorded = noisy && point < HELD_OUT_RUN;
-    if recorded {
-        let counts_per_tick = case.conditions.counts_per_tick();
-        if counts_per_tick > 1 {
-            scenario.effects.push(Effect::Quantization(Quantization { counts_per_tick }));
-        }
+    let is_seen_in_work = noisy && point < HELD_OUT_RUN;
+    let is_logged = recorded == Recorded::AsLogged && point < HELD_OUT_RUN;
+    let counts_per_tick = case.conditions.counts_per_tick();
+    if is_logged && counts_per_tick > 1 {
+        scenario.effects.push(Effect::Quantization(Quantization { counts_per_tick }));
+    }
+    if is_seen_in_work {
         scenario.effects.extend(case.instrument_model.class.effect().filter(|effect| !ids.contains(&effect.id())));
     }
     let mut more: Vec<(&'static str, Box<dyn Forward>)> = Vec::new();
@@ -103,7 +117,7 @@ fn drive_session(
         // What an instrument of the scenario errs by is in its readings already.
         let errs = noisy && !states_its_own;
         case.instrument_model.measurement(&mut run, errs.then_some(&mut draw));
-        if recorded {
+        if is_logged {
             let mut draw = Draw(address.stream(StreamName::new("challenge log")));
             log_model::record(case.conditions, &mut run, &mut draw);
         }

@@ -38,6 +38,8 @@ mod score;
 mod strata;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod trial;
 mod true_noise;
 
 use std::collections::BTreeMap;
@@ -50,6 +52,7 @@ use case::Case;
 pub use baseline::{DiagnosisBaseline, DiagnosisCheck, FALSE_ALARM_BUDGET, Guard, Guarded};
 pub use case_instrument::CaseInstrument;
 pub use case_kind::CaseKind;
+pub use drive::Recorded;
 pub use error::ChallengeError;
 pub use hidden::EffectKind;
 pub use instrument::{NoiseClass, TruthKind};
@@ -145,17 +148,22 @@ pub struct CaseLogs {
     pub geometry: Option<kinematics::DriveGeometry>,
 }
 
-/// The logs of one case; `Err` with the id where no robot drawn for an effect shows it.
+/// The logs of one case, its sessions recorded as asked; `Err` with the id where no robot drawn for an effect
+/// shows it.
 ///
 /// # Errors
 /// As [`challenge_case`].
-pub fn case_logs(scope: Scope, seed: u64, number: u64) -> Result<Result<CaseLogs, &'static str>, ChallengeError> {
+pub fn case_logs(
+    (scope, seed, number): (Scope, u64, u64),
+    recorded: Recorded,
+) -> Result<Result<CaseLogs, &'static str>, ChallengeError> {
     let case = match Case::draw(scope, seed, number)? {
         Ok(case) => case,
         Err(id) => return Ok(Err(id)),
     };
     let (elsewhere, known, geometry) = (case.drive_elsewhere()?, score::undiagnosed(number, &case), case.truth());
-    Ok(Ok(CaseLogs { sessions: case.datasets, elsewhere, known, geometry }))
+    let sessions = if recorded == Recorded::AsLogged { case.datasets } else { case.sessions(recorded)? };
+    Ok(Ok(CaseLogs { sessions, elsewhere, known, geometry }))
 }
 
 /// What came of a case.

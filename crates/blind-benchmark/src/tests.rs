@@ -4,10 +4,10 @@
 use rayon::prelude::*;
 use statrs::distribution::{Binomial, DiscreteCDF};
 
-use super::case::Trial;
 use super::hidden::EffectKind;
 use super::instrument::TruthKind;
 use super::power::power;
+use super::trial::Trial;
 use super::*;
 
 /// Probability of either side of a binomial count at which a test fails.

@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 
 use kinematics::{DriveGeometry, Side, Twist, Wheels};
 
-use crate::median::median;
+use crate::order_statistics::median;
 use crate::record::{NominalRobot, Run, WheelLog};
 use crate::settings::{
     COUNT_TOLERANCE, COUNT_TOLERANCE_RATIO, MAX_CHANCE_OF_COUNTS, MAX_COUNTS, MAX_ROUNDED_COUNTS, MIN_COUNT_ERROR,

@@ -3,6 +3,8 @@
 //! Rows between gaps have no common beat, but lengths of their own. Most differ by what a scheduler makes of
 //! them. A few are longer by far more: something came in between, and such a length is true.
 
+use crate::order_statistics::{median, quantile};
+
 /// Rows from which on there is a usual length.
 const MIN_ROWS: usize = 24;
 /// Share of the rows whose lengths depart by jitter alone, at the least. The median would not do: lengths
@@ -17,27 +19,19 @@ const MAX_JITTER_RATIO: f64 = 3.0;
 #[must_use]
 pub fn row_jitter_s(t_s: &[f64]) -> Vec<f64> {
     let lengths_s: Vec<f64> = t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    if t_s.len() < MIN_ROWS {
+    let Some(usual_s) = median(lengths_s.iter().copied()).filter(|_| t_s.len() >= MIN_ROWS) else {
         return vec![0.0; lengths_s.len()];
-    }
-    let usual_s = quantile(lengths_s.clone(), 0.5);
+    };
     let departures_s: Vec<f64> = lengths_s.into_iter().map(|length_s| length_s - usual_s).collect();
-    let jitter_s = quantile(departures_s.iter().map(|departure_s| departure_s.abs()).collect(), JITTER_SHARE);
+    let jitter_s = quantile(departures_s.iter().map(|departure_s| departure_s.abs()), JITTER_SHARE).unwrap_or(0.0);
     let is_jitter = |departure_s: f64| departure_s.abs() <= MAX_JITTER_RATIO * jitter_s;
     let long_s: Vec<f64> = departures_s.iter().copied().filter(|departure_s| !is_jitter(*departure_s)).collect();
     let jitter_of = |departure_s: f64| {
-        if is_jitter(departure_s) {
-            return departure_s;
-        }
         // Rows that are longer by about as much have a usual length of their own.
-        departure_s - quantile(long_s.iter().copied().filter(|long_s| is_jitter(long_s - departure_s)).collect(), 0.5)
+        let alike_s = long_s.iter().copied().filter(|long_s| is_jitter(long_s - departure_s));
+        if is_jitter(departure_s) { departure_s } else { departure_s - median(alike_s).unwrap_or(departure_s) }
     };
     departures_s.iter().map(|departure_s| jitter_of(*departure_s)).collect()
-}
-
-fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
-    let at = (share * values.len() as f64) as usize;
-    *values.select_nth_unstable_by(at, f64::total_cmp).1
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The likeliest numbers of a log's rows on a beat (Viterbi 1967): each path through lost and late rows has
 //! its own idea of how late rows usually are, and the likeliest few are followed side by side.
 
-use crate::median::median;
+use crate::order_statistics::median;
 
 /// Paths that are followed side by side.
 const PATHS: usize = 8;
@@ -91,7 +91,7 @@ fn step_cost(ticks: i64, costs: RowCosts) -> f64 {
 
 /// Standard deviation of stamps, in beats: by second differences, of which the middle one has no lost rows.
 fn jitter(t_s: &[f64], period_s: f64) -> f64 {
-    let second = t_s.windows(3).map(|three| (three[2] - 2.0 * three[1] + three[0]).abs() / period_s).collect();
+    let second = t_s.windows(3).map(|three| (three[2] - 2.0 * three[1] + three[0]).abs() / period_s);
     // Second differences of independent normal errors have √6 times their standard deviation, gaps √2 times.
     let of_second = median(second).unwrap_or(0.0) / (0.674_49 * 6_f64.sqrt());
     of_second.max(MIN_JITTER)
@@ -103,7 +103,7 @@ pub(crate) fn likeliest_numbers(t_s: &[f64], period_s: f64, costs: RowCosts) -> 
     let at = |row: usize| (t_s[row] - t_s[0]) / period_s;
     let jitter = jitter(t_s, period_s);
     // The first row may be late itself.
-    let usual = median((0..FIRST_ROWS).map(|row| at(row) - row as f64).collect()).unwrap_or(0.0);
+    let usual = median((0..FIRST_ROWS).map(|row| at(row) - row as f64)).unwrap_or(0.0);
     // The paths of all rows, and where each row's begin.
     let (mut paths, mut starts) = (vec![Path { number: 0, cost: 0.0, usual, from: 0 }], vec![0]);
     let mut next: Vec<Path> = Vec::with_capacity(PATHS + 1);

@@ -8,7 +8,7 @@
 //! path with its own idea of how late rows usually are, so that a clock need not keep one beat all day.
 
 use crate::lateness::{LINE_ROWS, is_alone, lateness, lateness_of_ticks};
-use crate::median::median;
+use crate::order_statistics::median;
 use crate::packets::Packets;
 use crate::receipt_delays::Received;
 use crate::row_numbers::{RowCosts, likeliest_numbers};
@@ -80,7 +80,7 @@ impl SamplingPeriod {
             let (period_s, numbers, off_s) = (received.period_s, received.numbers(), root_mean_square(&late_s));
             return Some(Self { period_s, numbers, late_s, is_bunched: true, off_s });
         }
-        let gap_s = median(t_s.windows(2).map(|pair| pair[1] - pair[0]).collect())?;
+        let gap_s = median(t_s.windows(2).map(|pair| pair[1] - pair[0]))?;
         // The middle gap is exact where stamps are.
         if let Some(numbers) = numbers_beside_rows_of_their_own(t_s, gap_s) {
             return Some(Self {
@@ -158,7 +158,7 @@ fn root_mean_square(values: &[f64]) -> f64 {
 /// rows, then of more, are whole numbers most nearly (Rayleigh's test of their phases).
 fn first_periods(t_s: &[f64]) -> Option<[f64; 2]> {
     let span = LINE_ROWS.min(t_s.len() / SPANS);
-    let mean_s = median(t_s.windows(span + 1).map(|rows| (rows[span] - rows[0]) / span as f64).collect())?;
+    let mean_s = median(t_s.windows(span + 1).map(|rows| (rows[span] - rows[0]) / span as f64))?;
     if mean_s <= 0.0 {
         return None;
     }
@@ -180,8 +180,7 @@ fn first_periods(t_s: &[f64]) -> Option<[f64; 2]> {
 fn period(t_s: &[f64], numbers: &[i64]) -> Option<f64> {
     let span = LINE_ROWS.min(t_s.len() / SPANS);
     let of = |(t_s, numbers): (&[f64], &[i64])| (t_s[span] - t_s[0]) / ((numbers[span] - numbers[0]).max(1) as f64);
-    let all = t_s.windows(span + 1).zip(numbers.windows(span + 1)).map(of).collect();
-    median(all).filter(|period_s| *period_s > 0.0)
+    median(t_s.windows(span + 1).zip(numbers.windows(span + 1)).map(of)).filter(|period_s| *period_s > 0.0)
 }
 
 /// Whether two beats are hardly apart at the end of a log: they number its rows alike.

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use dataset::{Dataset, NominalRobot, Protocol};
+use dataset::{Dataset, NominalRobot, Protocol, median};
 use effects::{
     Covariate, Effect, PhysicalEffect, Quantization, Sparse, SparseTerm, WheelMismatch, WheelScale, Wheelbase,
     effect_from_estimates,
@@ -170,22 +170,15 @@ pub(crate) struct SamplingStatistics {
 impl SamplingStatistics {
     pub(crate) fn of(datasets: &[Dataset], model: &AugmentedModel<'_>) -> Self {
         let runs = datasets.iter().flat_map(|dataset| &dataset.runs);
-        let mut rows: Vec<f64> =
-            runs.flat_map(|run| run.odometry.t_s.windows(2).map(|pair| pair[1] - pair[0])).collect();
-        let mut measurements: Vec<f64> = model.fit.records.times_between().collect();
+        let rows = runs.flat_map(|run| run.odometry.t_s.windows(2).map(|pair| pair[1] - pair[0]));
         let driven = model.fit.records.drive_statistics(&model.fit.solution.model);
         Self {
             speed_m_s: driven.map_or(DEFAULT_SPEED_M_S, |driven| driven.cruise_speed_m_s).clamp(0.01, 5.0),
             acceleration_m_s2: driven.and_then(|driven| driven.acceleration_m_s2),
-            between_rows_s: quantile(&mut rows, 0.5).unwrap_or(10.0).clamp(1e-3, 1e3),
-            between_measurements_s: quantile(&mut measurements, 0.5).unwrap_or(10.0).clamp(1e-2, 1e3),
+            between_rows_s: median(rows).unwrap_or(10.0).clamp(1e-3, 1e3),
+            between_measurements_s: median(model.fit.records.times_between()).unwrap_or(10.0).clamp(1e-2, 1e3),
         }
     }
-}
-
-fn quantile(values: &mut [f64], share: f64) -> Option<f64> {
-    let at = (values.len() as f64 * share) as usize;
-    (at < values.len()).then(|| *values.select_nth_unstable_by(at, f64::total_cmp).1)
 }
 
 /// What was driven, as far as schedules have words for it; squares where they have none.
@@ -277,13 +270,6 @@ mod tests {
         assert_eq!(driven, expected);
         // What has no words is driven as straights, spins and squares.
         assert_eq!(of(&[(None, 1.0)]).len(), 3);
-    }
-
-    #[test]
-    fn a_quantile_is_the_value_below_which_its_share_lies() {
-        let of = |share| quantile(&mut [3.0, 1.0, 4.0, 2.0], share);
-        assert_eq!((of(0.0), of(0.5), of(0.75), of(1.0)), (Some(1.0), Some(3.0), Some(4.0), None));
-        assert_eq!(quantile(&mut [], 0.5), None);
     }
 
     #[test]

@@ -7,7 +7,7 @@
 //! little. Reference: Censi et al. 2013, eq. 17–20 (the linear form); Holland & Welsch 1977 (iterative
 //! reweighting).
 
-use dataset::{Dataset, TruthSample};
+use dataset::{Dataset, TruthSample, median};
 use estimation::WheelAngleInterpolator;
 use kinematics::{Increment, Pose, Wheels, wrap_to_pi};
 use nalgebra::{Matrix2, Matrix3, Matrix4, Vector2, Vector3, Vector4};
@@ -57,9 +57,7 @@ impl PoseTrack {
         let (first_s, last_s) = (*rows_s.first()?, *rows_s.last()?);
         let angles = |row: usize| track.turns().as_ref().map(|turns| turns[row]);
         let between = |t_s: f64| turns_at(rows_s, track.turns(), t_s);
-        let mut lengths_s: Vec<f64> = rows_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        lengths_s.sort_by(f64::total_cmp);
-        let gap_s = MIN_GAP_RATIO * lengths_s.get(lengths_s.len() / 2).copied()?;
+        let gap_s = MIN_GAP_RATIO * median(rows_s.windows(2).map(|pair| pair[1] - pair[0]))?;
         let mut of = Self { run: number, t_s: vec![], measured: vec![], steps_m: vec![], after: vec![], gaps: vec![] };
         let mut gaps = 0;
         let (mut last, mut row) = (Wheels::both(0.0), 0);
@@ -242,17 +240,13 @@ fn windows(poses: usize, span: usize) -> impl Iterator<Item = (usize, usize)> {
 /// The shortest span whose windows reach so far that wheels show in them, by their median.
 fn span(tracks: &[PoseTrack], separation_m: f64) -> Option<usize> {
     let reaches = |span: &usize| {
-        let mut distances_m: Vec<f64> = tracks
-            .iter()
-            .flat_map(|track| {
-                windows(track.len(), *span).map(|window| {
-                    let Wheels { left, right } = track.travel_m(window);
-                    left.abs().max(right.abs())
-                })
+        let distances_m = tracks.iter().flat_map(|track| {
+            windows(track.len(), *span).map(|window| {
+                let Wheels { left, right } = track.travel_m(window);
+                left.abs().max(right.abs())
             })
-            .collect();
-        distances_m.sort_by(f64::total_cmp);
-        distances_m.get(distances_m.len() / 2).is_some_and(|m| *m > WINDOW_DISTANCE_SEPARATIONS * separation_m)
+        });
+        median(distances_m).is_some_and(|m| m > WINDOW_DISTANCE_SEPARATIONS * separation_m)
     };
     WINDOW_SPANS.into_iter().find(reaches)
 }

@@ -158,25 +158,16 @@ pub(crate) fn by_wheels(robot: &NominalRobot, twist: Twist, change: impl Fn(Whee
     robot.geometry().map_or(twist, |geometry| geometry.twist(change(geometry.wheel_speed_m_s(twist))))
 }
 
-/// The middle of several values, or `None` of none.
-pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
-    middle(&mut values)
-}
-
-/// The same of the first `N` of some values, without memory of their own.
+/// The middle of the first `N` of some values, without memory of their own; `None` of none.
 pub(crate) fn median_of_few<const N: usize>(values: impl Iterator<Item = f64>) -> Option<f64> {
     let (mut few, mut count) = ([0.0; N], 0);
     for (place, value) in few.iter_mut().zip(values) {
         *place = value;
         count += 1;
     }
-    middle(&mut few[..count])
-}
-
-fn middle(values: &mut [f64]) -> Option<f64> {
-    values.sort_unstable_by(f64::total_cmp);
-    let n = values.len();
-    let (low, high) = (values.get(n.checked_sub(1)? / 2)?, values.get(n / 2)?);
+    let few = &mut few[..count];
+    few.sort_unstable_by(f64::total_cmp);
+    let (low, high) = (few.get(count.checked_sub(1)? / 2)?, few.get(count / 2)?);
     Some(0.5 * (low + high))
 }
 

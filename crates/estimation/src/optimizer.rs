@@ -1,5 +1,6 @@
 //! The fit: Gauss–Newton for the mean parameters and Fisher scoring for the noise, side by side.
 
+use dataset::median;
 use kinematics::{Pose, unwrap_near};
 use model_term::ModelTerm;
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
@@ -158,18 +159,14 @@ pub(crate) fn fit_from(
             let mean = MeanStep::of(&found, options, &basis)?;
             let (_, own) = take_step(&mut model, &mut headings, &found, options, mean.by)?;
             let moved = mean.squared + own;
-            let mut squares: Vec<f64> =
-                found.innovations.iter().flatten().map(|innovation| innovation.z.powi(2)).collect();
-            let middle = squares.len() / 2;
             if noise_score {
                 let step = NoiseStep::of(&noise, &found, prior, basis.ncols());
                 take_noise_step(&mut noise, step.by);
-            } else if squares.is_empty() {
-                break;
             } else {
-                let (_, median, _) = squares.select_nth_unstable_by(middle, f64::total_cmp);
+                let squares = found.innovations.iter().flatten().map(|innovation| innovation.z.powi(2));
+                let Some(median) = median(squares) else { break };
                 noise = noise.scaled(
-                    (*median / CHI_SQUARE_1_MEDIAN).clamp(MAX_NOISE_SCALING.recip(), MAX_NOISE_SCALING),
+                    (median / CHI_SQUARE_1_MEDIAN).clamp(MAX_NOISE_SCALING.recip(), MAX_NOISE_SCALING),
                     MIN_NOISE_SIGMA * MIN_NOISE_SIGMA,
                 );
             }

@@ -7,7 +7,7 @@
 
 use std::collections::BTreeMap;
 
-use dataset::{GyroNoise, LidarExtrinsics, MIN_LIDAR_TURN_RAD, Run, RunView, Session};
+use dataset::{GyroNoise, LidarExtrinsics, MIN_LIDAR_TURN_RAD, Run, RunView, Session, median};
 use kinematics::Wheels;
 
 use crate::model::Model;
@@ -321,11 +321,7 @@ fn noise_from_log(session: &Session<'_>, drive: &Model) -> Option<f64> {
     let variance = if standing.len() >= MIN_STANDING_PAIRS {
         standing.iter().sum::<f64>() / standing.len() as f64
     } else {
-        let middle = moving.len() / 2;
-        if moving.is_empty() {
-            return None;
-        }
-        *moving.select_nth_unstable_by(middle, f64::total_cmp).1 / crate::settings::CHI_SQUARE_1_MEDIAN
+        median(moving)? / crate::settings::CHI_SQUARE_1_MEDIAN
     };
     Some(variance.sqrt().max(crate::settings::MIN_GYRO_NOISE_RAD_PER_SQRT_S))
 }

@@ -10,7 +10,7 @@
 
 use std::f64::consts::TAU;
 
-use dataset::{NominalRobot, RunView, WheelLog};
+use dataset::{NominalRobot, RunView, WheelLog, median};
 use kinematics::{Twist, Wheels};
 
 use crate::settings::{CHI_SQUARE_1_MEDIAN, MIN_COUNT_STEPS};
@@ -96,9 +96,7 @@ fn dithering_variance(steps: &[i32], counted: Wheels<f64>) -> f64 {
     let (weights, squares_of_weights, of_one_sign) = FIFTH;
     let in_motion = steps.windows(6).filter(|of| of.iter().any(|step| *step != 0));
     let fifth = |of: &[i32]| of.iter().zip(weights).map(|(step, weight)| weight * f64::from(*step)).sum::<f64>();
-    let mut squares: Vec<f64> = in_motion.map(|of| fifth(of).powi(2)).collect();
-    squares.sort_unstable_by(f64::total_cmp);
-    let middle = squares.get(squares.len() / 2).copied().unwrap_or(0.0);
+    let middle = median(in_motion.map(|of| fifth(of).powi(2))).unwrap_or(0.0);
     let is_coarse = f64::max(counted.left, counted.right) >= MIN_COUNT_STEPS;
     let of_counts = if is_coarse { (of_one_sign * (counted.left + counted.right)).powi(2) } else { 0.0 };
     0.25 * f64::max((middle - of_counts) / CHI_SQUARE_1_MEDIAN / squares_of_weights - 1.0 / 12.0, 0.0)

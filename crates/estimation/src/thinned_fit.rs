@@ -4,13 +4,13 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
+use dataset::median;
 use model_term::ModelTerm;
 
 use crate::error::EstimationError;
 use crate::model::Column;
 use crate::model_fit::ModelFit;
 use crate::optimizer::{ConvergenceCriterion, FitOptions};
-use crate::records::Records;
 use crate::settings::{MIN_MEASUREMENTS_PER_RUN, SPACING_SLACK, THINNING_FACTOR, THINNING_PHASES};
 use crate::thinning::{Selection, Thinning};
 
@@ -22,7 +22,7 @@ impl ModelFit<'_> {
 
     /// The same of a fit with terms.
     fn thin_beside(&mut self, terms: &mut [Box<dyn ModelTerm>]) -> Result<(), EstimationError> {
-        let Some(between_s) = median_between(&self.records) else { return Ok(()) };
+        let Some(between_s) = median(self.records.times_between()) else { return Ok(()) };
         let mut every_s = between_s;
         // How autocorrelated innovations are depends on no last digit of a fit.
         let compared = FitOptions { ends: ConvergenceCriterion::Likelihood, ..self.fit_options() };
@@ -108,7 +108,7 @@ impl ModelFit<'_> {
 
     /// Does [`Self::thin`] leave measurements out?
     pub(crate) fn is_to_be_thinned(&self) -> bool {
-        let between_s = median_between(&self.records).filter(|_| !self.is_white());
+        let between_s = median(self.records.times_between()).filter(|_| !self.is_white());
         between_s.is_some_and(|between_s| self.thinned(THINNING_FACTOR * between_s, between_s).is_some())
     }
 
@@ -129,14 +129,4 @@ impl ModelFit<'_> {
         whole.solution.pass.innovations = self.scan(terms).innovations;
         Cow::Owned(whole)
     }
-}
-
-/// Median time between measurements.
-fn median_between(records: &Records<'_>) -> Option<f64> {
-    let mut between: Vec<f64> = records.times_between().collect();
-    if between.is_empty() {
-        return None;
-    }
-    let middle = between.len() / 2;
-    Some(*between.select_nth_unstable_by(middle, f64::total_cmp).1)
 }

@@ -8,6 +8,7 @@
 //! variance, and that of the rounding below a hundredth, unless a wider one blurs more than it averages out
 //! (Savitzky & Golay 1964; Lepski 1990).
 
+use dataset::median;
 use kinematics::Wheels;
 
 use crate::quantum::variance_of_rounding;
@@ -349,15 +350,6 @@ fn mean_square_rate(t_s: &[f64], turn_rad: &[f64]) -> f64 {
 fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = values.fold((0.0, 0.0_f64), |(sum, count), value| (sum + value, count + 1.0));
     sum / count.max(1.0)
-}
-
-fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.collect();
-    if values.is_empty() {
-        return None;
-    }
-    let middle = values.len() / 2;
-    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 #[cfg(test)]

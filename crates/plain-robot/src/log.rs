@@ -113,6 +113,11 @@ impl PlainRobot {
                 self.speeds_m_s(row, since)
             };
             filtered_m_s = [0, 1].map(|wheel| filtered_m_s[wheel] + share * (now_m_s[wheel] - filtered_m_s[wheel]));
+            if self.knows_wheels {
+                let [left, right] = path.samples[step].wheels_rad;
+                writeln!(odometry, "{id},{:.6},{left},{right}", 1e-3 * step as f64).expect("text");
+                continue;
+            }
             let values = self.recorded(counts, filtered_m_s);
             if is_lost || is_unchanged {
                 continue;

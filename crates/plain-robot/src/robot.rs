@@ -101,6 +101,9 @@ pub struct PlainRobot {
     pub stamps: Stamps,
     /// What a row says.
     pub records: Records,
+    /// Rows say what the wheels did: their angles, without rounding, at the instants of the stamps; none is
+    /// lost.
+    pub knows_wheels: bool,
     /// Recorded speeds are those of the row's instant.
     pub has_rates_of_instants: bool,
     /// Time constant of the filter of recorded speeds.
@@ -210,6 +213,7 @@ impl PlainRobot {
             odometry_hz: 100.0,
             stamps: Stamps::Exact,
             records: Records::Counts,
+            knows_wheels: false,
             has_rates_of_instants: false,
             speed_filter_s: 0.0,
             first_count: 0.0,

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use crate::draws::Draws;
 use crate::drive::{Part, World, programs};
-use crate::robot::PlainRobot;
+use crate::robot::{PlainRobot, Records};
 
 impl PlainRobot {
     /// The dataset in a temporary folder, and what [`Self::write`] says of the robot; where YAIR_OUT is set,
@@ -35,7 +35,8 @@ impl PlainRobot {
         let base_m = self.scale * 0.363 * (1.0 + 0.01 * draws.normal());
         let radius_m = [0; 2].map(|_| self.scale * 0.08 * (1.0 + 3e-3 * draws.normal()));
         let phase_rad = TAU * draws.uniform();
-        let (mut odometry, mut truth) = (format!("run,t_s,{}\n", self.records.columns()), String::new());
+        let records = if self.knows_wheels { Records::Angles { step_rad: 0.0 } } else { self.records };
+        let (mut odometry, mut truth) = (format!("run,t_s,{}\n", records.columns()), String::new());
         truth.push_str("run,t_s,x_m,y_m,theta_rad\n");
         let mut described = String::new();
         let programs: Vec<(&str, Vec<Part>)> = programs(&mut draws)

@@ -1,6 +1,7 @@
 //! Regression of an outcome on the turns of both wheels, y = c_L·Δ_L + c_R·Δ_R, by reweighted least squares.
 //! Reference: Holland & Welsch 1977 (Cauchy's weights).
 
+use dataset::median;
 use kinematics::Wheels;
 
 use crate::settings::{CAUCHY_MEDIANS, COLLINEAR_RATIO, ROBUST_PASSES};
@@ -76,7 +77,7 @@ pub(crate) fn regress(pairs: &[(Wheels<f64>, f64)], passes: usize) -> Option<Reg
             Wheels { left: inverse.ll * left + inverse.lr * right, right: inverse.lr * left + inverse.rr * right };
         let residual =
             |(turn, outcome): &(Wheels<f64>, f64)| outcome - per_rad.left * turn.left - per_rad.right * turn.right;
-        let mut sizes: Vec<f64> = pairs.iter().map(|pair| residual(pair).abs()).collect();
+        let sizes: Vec<f64> = pairs.iter().map(|pair| residual(pair).abs()).collect();
         let mean = sizes.iter().sum::<f64>() / sizes.len() as f64;
         let weighted_square: f64 = weighted().map(|(pair, weight)| weight * residual(pair).powi(2)).sum();
         let freedom = (weights.iter().sum::<f64>() - 2.0).max(1.0);
@@ -85,7 +86,7 @@ pub(crate) fn regress(pairs: &[(Wheels<f64>, f64)], passes: usize) -> Option<Reg
         let sigma = Wheels { left: (var * inverse.ll).sqrt(), right: (var * inverse.rr).sqrt() };
         found = Some(Regression { per_rad, sigma, left: mean, whole });
         if pass + 1 < passes {
-            let scale = CAUCHY_MEDIANS * upper_median(&mut sizes)? + f64::MIN_POSITIVE;
+            let scale = CAUCHY_MEDIANS * median(sizes)? + f64::MIN_POSITIVE;
             for (weight, pair) in weights.iter_mut().zip(pairs) {
                 *weight = 1.0 / (1.0 + (residual(pair) / scale).powi(2));
             }
@@ -114,26 +115,20 @@ pub(crate) fn slope(pairs: &[(f64, f64)]) -> Option<(f64, f64, f64, f64)> {
         }
         let slope = sums.1 / sums.0;
         let residual = |(x, y): &(f64, f64)| y - slope * x;
-        let mut sizes: Vec<f64> = pairs.iter().map(|pair| residual(pair).abs()).collect();
+        let sizes: Vec<f64> = pairs.iter().map(|pair| residual(pair).abs()).collect();
         let left = sizes.iter().sum::<f64>() / sizes.len() as f64;
         let square: f64 = pairs.iter().zip(&weights).map(|(pair, weight)| weight * residual(pair).powi(2)).sum();
         let var = square / (weights.iter().sum::<f64>() - 1.0).max(1.0);
         let whole = pairs.iter().map(|(_, y)| y.abs()).sum::<f64>() / pairs.len() as f64;
         found = Some((slope, (var / sums.0).sqrt(), left, whole));
         if pass + 1 < ROBUST_PASSES {
-            let scale = CAUCHY_MEDIANS * upper_median(&mut sizes)? + f64::MIN_POSITIVE;
+            let scale = CAUCHY_MEDIANS * median(sizes)? + f64::MIN_POSITIVE;
             for (weight, pair) in weights.iter_mut().zip(pairs) {
                 *weight = 1.0 / (1.0 + (residual(pair) / scale).powi(2));
             }
         }
     }
     found
-}
-
-/// The middle of some values, the upper one of an even number; `None` of none. Puts them in another order.
-fn upper_median(values: &mut [f64]) -> Option<f64> {
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@
 
 use std::f64::consts::GOLDEN_RATIO;
 
-use dataset::TruthSample;
+use dataset::{TruthSample, quantile};
 use kinematics::{sin_cos, sinc, wrap_to_pi};
 
 use crate::run_log::RunLog;
@@ -70,11 +70,7 @@ pub(crate) fn windows(runs: &[RunLog], reading: Reading, most: usize) -> (Vec<Wi
             of_positions(number, run, &mut all);
         }
     }
-    let usual = |of: fn(&Window) -> f64, windows: &[Window]| {
-        let mut values: Vec<f64> = windows.iter().map(of).collect();
-        values.sort_by(f64::total_cmp);
-        values.get(values.len() * 9 / 10).copied().unwrap_or(0.0)
-    };
+    let usual = |of: fn(&Window) -> f64, windows: &[Window]| quantile(windows.iter().map(of), 0.9).unwrap_or(0.0);
     let speed = |window: &Window| window.ahead_m.hypot(window.left_m) / (window.to_s - window.from_s);
     let most_m_s = OUTLYING_MOTION_RATIO * usual(speed, &all);
     all.retain(|window| speed(window).is_finite() && (speed(window) <= most_m_s || most_m_s == 0.0));

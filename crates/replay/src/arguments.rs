@@ -30,6 +30,10 @@ pub(crate) struct Arguments {
     /// Seeds of all that is drawn.
     #[arg(long, value_name = "S", num_args = 1.., default_values_t = [63_001, 63_002, 63_003])]
     pub(crate) seeds: Vec<u64>,
+    /// Ask NEW drawn logs whose rows say what the wheels did and when, without rounding, loss or late stamps:
+    /// what a perfect model of a log could win. Mixed logs stay as they are.
+    #[arg(long, conflicts_with_all = ["store_as", "real", "corpus"])]
+    pub(crate) knows_wheels: bool,
     /// Where logs and outcomes are kept.
     #[arg(long, value_name = "DIR", default_value = "target/replay")]
     pub(crate) store: PathBuf,

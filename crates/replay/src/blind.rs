@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use blind_benchmark::{CaseKind, CaseLogs, EffectKind, OracleView, Scope, case_logs};
+use blind_benchmark::{CaseKind, CaseLogs, EffectKind, OracleView, Recorded, Scope, case_logs};
 use dataset::{Dataset, Existing};
 use kinematics::DriveGeometry;
 
@@ -17,16 +17,19 @@ pub fn name(seed: u64, number: u64) -> String {
 }
 
 /// Writes one case of a seed into a folder of its own below `corpus`, unless it stands there; nothing where
-/// no robot drawn for an effect shows it.
+/// no robot drawn for an effect shows it. Where the tool `knows_wheels`, rows say what the wheels did and
+/// when.
 ///
 /// # Errors
 /// A sentence where a case cannot be simulated or written.
-pub fn write(corpus: &Path, seed: u64, number: u64) -> Result<(), String> {
+pub fn write(corpus: &Path, seed: u64, number: u64, knows_wheels: bool) -> Result<(), String> {
     let folder = corpus.join(name(seed, number));
     if folder.join(ANSWER).exists() {
         return Ok(());
     }
-    let Ok(logs) = case_logs(Scope::Whole, seed, number).map_err(|error| error.to_string())? else { return Ok(()) };
+    let recorded = if knows_wheels { Recorded::OfTheWheels } else { Recorded::AsLogged };
+    let logs = case_logs((Scope::Whole, seed, number), recorded).map_err(|error| error.to_string())?;
+    let Ok(logs) = logs else { return Ok(()) };
     write_log(&folder, &answer(&logs, seed), &logs.sessions, &logs.elsewhere)
 }
 

@@ -43,11 +43,12 @@ impl Draw {
         }
     }
 
-    /// Writes the log below a corpus, unless it stands there.
-    pub(crate) fn write(&self, corpus: &Path) -> Result<(), String> {
+    /// Writes the log below a corpus, unless it stands there. Where the tool `knows_wheels`, rows say what
+    /// the wheels did and when; a mixed log's fault is often in its rows, which stay as they are.
+    pub(crate) fn write(&self, corpus: &Path, knows_wheels: bool) -> Result<(), String> {
         match self {
-            Self::Blind { seed, number } => write_blind_case(corpus, *seed, *number),
-            Self::OfKind { kind, seed } => write_kind(corpus, *kind, *seed, seed / APART),
+            Self::Blind { seed, number } => write_blind_case(corpus, *seed, *number, knows_wheels),
+            Self::OfKind { kind, seed } => write_kind(corpus, *kind, *seed, seed / APART, knows_wheels),
             Self::Mixed { seed } => write_mixed(corpus, *seed, seed / APART),
         }
     }

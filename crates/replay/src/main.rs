@@ -28,7 +28,7 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<ExitCode, Box<dyn Error>> {
-    let logs = logs(arguments)?;
+    let logs = logs(arguments, false)?;
     let said: Vec<String> = counts(&logs).into_iter().map(|(corpus, count)| format!("{count} of {corpus}")).collect();
     remark(&format!("{} logs: {}", logs.len(), said.join(", ")));
     let (old_build, old) = outcomes(arguments, &arguments.old, &logs)?;
@@ -40,7 +40,11 @@ fn run(arguments: &Arguments) -> Result<ExitCode, Box<dyn Error>> {
         return Ok(ExitCode::SUCCESS);
     }
     let new = arguments.new.as_deref().ok_or("NEW is missing, and --store-as as well")?;
-    let (new_build, new) = outcomes(arguments, new, &logs)?;
+    let known = if arguments.knows_wheels { self::logs(arguments, true)? } else { logs.clone() };
+    if known.iter().map(|log| &log.name).ne(logs.iter().map(|log| &log.name)) {
+        return Err("logs with known wheels are not those without".into());
+    }
+    let (new_build, new) = outcomes(arguments, new, &known)?;
     remark(&format!("old: {old_build}; new: {new_build}"));
     let comparison = Comparison::of(&logs, &old, &new);
     let mut output = std::io::stdout().lock();
@@ -59,15 +63,15 @@ fn run(arguments: &Arguments) -> Result<ExitCode, Box<dyn Error>> {
 }
 
 /// The logs of every corpus; drawn ones are written where they are not there yet.
-fn logs(arguments: &Arguments) -> Result<Vec<Log>, Box<dyn Error>> {
-    let drawn = arguments.store.join("logs");
+fn logs(arguments: &Arguments, knows_wheels: bool) -> Result<Vec<Log>, Box<dyn Error>> {
+    let drawn = arguments.store.join(if knows_wheels { "known_wheels" } else { "logs" });
     let draws = draws(arguments);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(arguments.jobs).build()?;
     let done = progress("logs drawn", draws.len());
     pool.install(|| {
         draws.par_iter().try_for_each(|draw| {
             done();
-            draw.write(&drawn)
+            draw.write(&drawn, knows_wheels)
         })
     })?;
     let mut logs = if draws.is_empty() { Vec::new() } else { Log::all(&drawn)? };

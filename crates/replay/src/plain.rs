@@ -21,14 +21,15 @@ pub fn mixed_name(seed: u64) -> String {
 }
 
 /// Writes the log of a robot of a kind into a folder of its own below `corpus`, unless it stands there;
-/// `group` is the seed of the campaign.
+/// `group` is the seed of the campaign. Where the tool `knows_wheels`, rows say what the wheels did and when.
 ///
 /// # Errors
 /// A sentence with the answer that cannot be written.
-pub fn write_kind(corpus: &Path, kind: Kind, seed: u64, group: u64) -> Result<(), String> {
+pub fn write_kind(corpus: &Path, kind: Kind, seed: u64, group: u64, knows_wheels: bool) -> Result<(), String> {
     let (name, change, exempt) = kind;
     let mut robot = PlainRobot::ordinary(seed);
     change(&mut robot);
+    robot.knows_wheels = knows_wheels;
     let strata = BTreeMap::from([("kind".to_owned(), name.to_owned())]);
     let answer = Answer {
         exempt: exempt.iter().map(|id| (*id).to_owned()).collect(),

@@ -9,6 +9,8 @@
 //! are the sums of the squares of these terms times N / (N − 2) (White 1980; MacKinnon & White 1985, HC1):
 //! the noise of ranges need not be known, nor the same at all incidences.
 
+use dataset::median;
+
 use crate::settings::{
     MAX_WALL_GAP_M, MAX_WALLS_PER_SCAN, MIN_PAIR_M, MIN_WALL_BEAMS, MIN_WALL_LENGTH_M, MIN_WALL_SHARE,
     MIN_WALL_SIGMA_M, MIN_WALL_SIGMA_RAD, MIN_WALL_TOLERANCE_M, WALL_PAIRS, WALL_REFITS, WALL_TOLERANCE_M,
@@ -121,10 +123,8 @@ fn refined(mut line: Line, points: &[ScanPoint]) -> Option<(Line, Vec<ScanPoint>
         let near = points.iter().filter(|point| line.across_m(point).abs() <= tolerance_m).copied().collect();
         inliers = longest_piece(&line, near);
         line = Line::fitted(&inliers)?;
-        let mut across_m: Vec<f64> = inliers.iter().map(|point| line.across_m(point).abs()).collect();
-        let middle = across_m.len() / 2;
-        let (_, median_m, _) = across_m.select_nth_unstable_by(middle, f64::total_cmp);
-        let by_scatter_m = WALL_TOLERANCE_SIGMAS * MAD_TO_SIGMA * *median_m;
+        let median_m = median(inliers.iter().map(|point| line.across_m(point).abs()))?;
+        let by_scatter_m = WALL_TOLERANCE_SIGMAS * MAD_TO_SIGMA * median_m;
         tolerance_m = by_scatter_m.clamp(MIN_WALL_TOLERANCE_M, WALL_TOLERANCE_M);
     }
     Some((line, inliers))

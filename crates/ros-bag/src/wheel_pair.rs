@@ -6,6 +6,7 @@
 //! right one on both sides near by are left out.
 
 use dataset::import::csv::Rates;
+use dataset::median;
 
 use crate::clock::{self, Clock, Times};
 use crate::error::RosBagError;
@@ -129,9 +130,7 @@ fn series(topic: &str, times: &[Times], values: &[f64], clock: Clock) -> Result<
 }
 
 fn median_step_s(series: &[(i64, f64)]) -> f64 {
-    let mut steps: Vec<f64> = series.windows(2).map(|pair| clock::seconds(pair[0].0, pair[1].0)).collect();
-    steps.sort_by(f64::total_cmp);
-    steps.get(steps.len() / 2).copied().unwrap_or(f64::INFINITY)
+    median(series.windows(2).map(|pair| clock::seconds(pair[0].0, pair[1].0))).unwrap_or(f64::INFINITY)
 }
 
 /// Puts the right wheel's numbers beside the left's.

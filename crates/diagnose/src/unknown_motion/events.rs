@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use dataset::quantile;
 use kinematics::{Pose, wrap_to_pi};
 
 use crate::pose_windows::{CalibratedTracks, Residual};
@@ -54,11 +55,9 @@ impl Limits {
                     all.iter_mut().zip(residual.iter()).for_each(|(all, residual)| all.push(residual.abs()));
                 }
             }
-            let sigma = |mut all: Vec<f64>| {
-                all.sort_by(f64::total_cmp);
-                // 0.9 of a normal variable is within 1.645 standard deviations.
-                all.get(all.len() * 9 / 10).map_or(f64::INFINITY, |of| (of / 1.645).max(MIN_WINDOW_SIGMA))
-            };
+            // 0.9 of a normal variable is within 1.645 standard deviations.
+            let sigma =
+                |all: Vec<f64>| quantile(all, 0.9).map_or(f64::INFINITY, |of| (of / 1.645).max(MIN_WINDOW_SIGMA));
             let [along, across, turn] = all.map(sigma);
             Residual::new(along, across, turn)
         };
@@ -175,11 +174,8 @@ fn rates<'c>(calibrated: &'c CalibratedTracks<'_>, track: usize) -> impl Iterato
 /// Speed and turn rate of the robot where it is brisk, by the 90 % quantile, m/s and rad/s.
 fn brisk_rates(calibrated: &CalibratedTracks<'_>) -> (f64, f64) {
     let (speeds, turn_rates) = (0..calibrated.tracks.len()).flat_map(|track| rates(calibrated, track)).unzip();
-    let quantile = |mut all: Vec<f64>| {
-        all.sort_by(f64::total_cmp);
-        all.get(all.len() * 9 / 10).copied().filter(|of| of.is_finite()).unwrap_or(0.0)
-    };
-    (quantile(speeds), quantile(turn_rates))
+    let brisk = |all: Vec<f64>| quantile(all, 0.9).filter(|of| of.is_finite()).unwrap_or(0.0);
+    (brisk(speeds), brisk(turn_rates))
 }
 
 /// Whether no robot moves so far in the time: by what is faster than anything in this run.

@@ -1,5 +1,6 @@
 //! Runs in which the instrument was mounted otherwise than in the others.
 
+use dataset::median;
 use kinematics::{Pose, wrap_to_pi};
 
 use super::events::{AnomalyKind, Event, Limits};
@@ -50,10 +51,6 @@ pub(super) fn other_extrinsics(
     let components = |pose: &Pose| {
         [pose.x_m - reference.x_m, pose.y_m - reference.y_m, wrap_to_pi(pose.theta_rad - reference.theta_rad)]
     };
-    let median = |mut all: Vec<f64>| {
-        all.sort_by(f64::total_cmp);
-        all[all.len() / 2]
-    };
     let mut found: Vec<(usize, OtherExtrinsics)> = Vec::new();
     for (axis, least) in least.into_iter().enumerate() {
         // The tracks that determine it.
@@ -67,9 +64,9 @@ pub(super) fn other_extrinsics(
         if of.len() < MIN_EXTRINSICS {
             continue;
         }
-        let middle = median(of.iter().map(|(_, value, ..)| *value).collect());
+        let Some(middle) = median(of.iter().map(|(_, value, ..)| *value)) else { continue };
         // 1.4826 times the median of normal deviations is their standard deviation.
-        let scatter = 1.4826 * median(of.iter().map(|(_, value, ..)| (value - middle).abs()).collect());
+        let scatter = median(of.iter().map(|(_, value, ..)| (value - middle).abs())).map_or(0.0, |of| 1.4826 * of);
         let odd: Vec<(usize, f64, f64)> = of
             .iter()
             .filter(|(_, value, halves, _)| {

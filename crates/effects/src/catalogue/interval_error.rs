@@ -13,7 +13,7 @@
 //! Reference: stamps given on receipt, by a scheduler that is late, of readings that a timer takes;
 //! milliseconds.
 
-use dataset::{Dataset, Timestamps, WheelLog};
+use dataset::{Dataset, Timestamps, WheelLog, median};
 use kinematics::Pose;
 use model_term::{Interval, ModelTerm, TermParameter};
 use serde::{Deserialize, Serialize};
@@ -207,10 +207,8 @@ fn counted_rows<'r>(
     let late_s2 = stamps_s.iter().zip(read_s).map(|(stamp_s, read_s)| (stamp_s - read_s).powi(2)).sum::<f64>();
     let late = (late_s2 / stamps_s.len() as f64).sqrt() / period_s;
     let extent = RATE_ROWS.max((4.0 * late) as usize);
-    let mut sizes: Vec<f64> = counts.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
-    let middle = sizes.len() / 2;
-    let most =
-        if sizes.is_empty() { 0.0 } else { MAX_COUNT_RATIO * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 };
+    let usual = median(counts.windows(2).map(|pair| (pair[1] - pair[0]).abs()));
+    let most = usual.map_or(0.0, |usual| MAX_COUNT_RATIO * usual);
     (extent + 1..stamps_s.len().saturating_sub(extent)).filter_map(move |row| {
         let (from, to) = (row - 1 - extent, row + extent);
         let rate = (counts[to] - counts[from]) / (read_s[to] - read_s[from]);

@@ -7,14 +7,14 @@
 //! Alias: none.
 //! Reference: what importers meet; ROS headers in nanoseconds, Arduino's millis() and micros().
 
-use dataset::{Dataset, Odometry, Run, RunSpans, WheelLog};
+use dataset::{Dataset, Odometry, Run, RunSpans, WheelLog, median};
 use serde::{Deserialize, Serialize};
 
 use crate::benchmark::Benchmark;
 use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, SampleClock};
-use crate::hypothesis::{Hypothesis, RecordCorrection, median, value_of};
+use crate::hypothesis::{Hypothesis, RecordCorrection, value_of};
 use crate::on_board::{Correction, OnBoard, RawInterval};
 
 /// Factors between units of time that people use.
@@ -84,7 +84,7 @@ fn span_ratio(dataset: &Dataset) -> Option<f64> {
         let [logged_s, measured_s] = RunSpans::of(run).comparable_s()?;
         Some(logged_s / measured_s)
     };
-    median(dataset.runs.iter().filter_map(ratio).collect())
+    median(dataset.runs.iter().filter_map(ratio))
 }
 
 /// Speed of a usual robot, m/s.

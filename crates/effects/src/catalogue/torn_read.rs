@@ -9,7 +9,7 @@
 //! Reference: the HCTL-1100's position is three bytes; a counter of 16 or 32 bits behind an 8-bit bus is
 //! alike.
 
-use dataset::{Dataset, WheelLog};
+use dataset::{Dataset, WheelLog, median};
 use kinematics::{Side, Wheels};
 use serde::{Deserialize, Serialize};
 
@@ -17,7 +17,7 @@ use crate::benchmark::Benchmark;
 use crate::description::Description;
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
-use crate::hypothesis::{Hypothesis, RecordCorrection, median, median_of_few, value_of};
+use crate::hypothesis::{Hypothesis, RecordCorrection, median_of_few, value_of};
 use crate::on_board::OnBoard;
 use crate::stream::Stream;
 
@@ -116,7 +116,7 @@ fn mend(t_s: &[f64], ticks: &mut [i64], jump: i64) -> Restored {
     };
     let all: Vec<f64> = (0..last).map(out_of_line).collect();
     // Of rows in motion: a wheel that stands is in line whatever the log is like.
-    let usual = median(all.iter().map(|off| off.abs()).filter(|off| *off > 0.0).collect()).unwrap_or(0.0);
+    let usual = median(all.iter().map(|off| off.abs()).filter(|off| *off > 0.0)).unwrap_or(0.0);
     if usual > step / 8.0 {
         return Restored::default();
     }

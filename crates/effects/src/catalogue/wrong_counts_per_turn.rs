@@ -9,7 +9,7 @@
 //! Alias: `wheel_scale`, whose sizes are per cents.
 //! Reference: quadrature decoding ×1, ×2, ×4; the units that people mix.
 
-use dataset::{Dataset, RunView, WheelLog};
+use dataset::{Dataset, RunView, WheelLog, median};
 use kinematics::{Pose, Rule, Twist, Wheels, sinc};
 use serde::{Deserialize, Serialize};
 
@@ -17,7 +17,7 @@ use crate::benchmark::Benchmark;
 use crate::description::{Description, RecordFault};
 use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
-use crate::hypothesis::{Hypothesis, RecordCorrection, median, rewrite_wheels, value_of};
+use crate::hypothesis::{Hypothesis, RecordCorrection, rewrite_wheels, value_of};
 use crate::on_board::{Correction, OnBoard, RawInterval};
 
 /// Factors by which people err.

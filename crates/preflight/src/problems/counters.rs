@@ -1,6 +1,7 @@
 //! Counters that show something else for a row, or start again from 0. Such rows are undone for the checks
 //! that follow.
 
+use dataset::{median, quantile};
 use kinematics::Side;
 
 use crate::kind::Kind;
@@ -57,14 +58,11 @@ fn faults(run: &RunLog, side: Side) -> Vec<Fault> {
         return Vec::new();
     }
     let length_s = |row: usize| run.t_s[row + 1] - run.t_s[row];
-    let mut lengths: Vec<f64> = (0..angles.len() - 1).map(length_s).collect();
-    lengths.sort_by(f64::total_cmp);
-    let median_s = lengths[lengths.len() / 2];
+    let Some(median_s) = median((0..angles.len() - 1).map(length_s)) else { return Vec::new() };
     // In a gap, wheels go on turning.
     let step = |row: usize| (angles[row + 1] - angles[row]) * (median_s / length_s(row)).min(1.0);
-    let mut sizes: Vec<f64> = (0..angles.len() - 1).map(|row| step(row).abs()).filter(|size| *size > 0.0).collect();
-    sizes.sort_by(f64::total_cmp);
-    let Some(usual) = sizes.get((sizes.len() as f64 * USUAL_STEP_QUANTILE) as usize) else { return Vec::new() };
+    let sizes = (0..angles.len() - 1).map(|row| step(row).abs()).filter(|size| *size > 0.0);
+    let Some(usual) = quantile(sizes, USUAL_STEP_QUANTILE) else { return Vec::new() };
     let usual = usual.max(MIN_USUAL_COUNTS * run.count_rad).max(MIN_WHEEL_TURN_RAD * 1e-2);
     let impossible = |row: usize| step(row).abs() > IMPOSSIBLE_STEP_RATIO * usual;
     let mut found = Vec::new();

@@ -1,7 +1,7 @@
 //! Times in milliseconds, of all tables; or of one in milli-, micro- or nanoseconds. The checks that follow
 //! have seconds.
 
-use dataset::MAX_ROW_S;
+use dataset::{MAX_ROW_S, median, quantile};
 
 use crate::kind::Kind;
 use crate::problem::{Problem, Severity};
@@ -10,12 +10,10 @@ use crate::session_check::SessionCheck;
 use crate::settings::{CLOCK_UNIT_RATIO, MIN_ROWS, MIN_SPEED_M_S, TIME_UNITS};
 
 pub(crate) fn found(check: &mut SessionCheck) {
-    let mut ratios: Vec<f64> = check.runs.iter().filter_map(spans).collect();
-    ratios.sort_by(f64::total_cmp);
-    if let Some(ratio) = ratios.get(ratios.len() / 2) {
+    if let Some(ratio) = median(check.runs.iter().filter_map(spans)) {
         let [low, high] = CLOCK_UNIT_RATIO;
         let unit_of = |ratio: f64| TIME_UNITS.iter().position(|unit| (low..=high).contains(&(ratio / unit)));
-        let of_truth = unit_of(*ratio).map(|unit| (unit, true));
+        let of_truth = unit_of(ratio).map(|unit| (unit, true));
         if let Some((unit, of_truth)) = of_truth.or_else(|| unit_of(ratio.recip()).map(|unit| (unit, false))) {
             let kind = Kind::TruthTimeUnit { unit, of_truth };
             check.problems.push(Problem::new(&kind, Severity::Error, None, 0.99));
@@ -30,9 +28,7 @@ pub(crate) fn found(check: &mut SessionCheck) {
             }
         }
     }
-    let mut rows: Vec<f64> = check.runs.iter().filter_map(median_row_s).collect();
-    rows.sort_by(f64::total_cmp);
-    let Some(&row) = rows.get(rows.len() / 2) else { return };
+    let Some(row) = median(check.runs.iter().filter_map(median_row_s)) else { return };
     let m_per_rad = check.m_per_rad().left.max(check.m_per_rad().right);
     let fastest_m_s = check.runs.iter().map(fastest_rad_s).fold(0.0, f64::max) * m_per_rad;
     if row > MAX_ROW_S && fastest_m_s < MIN_SPEED_M_S && fastest_m_s > 0.0 {
@@ -49,17 +45,13 @@ fn spans(run: &RunLog) -> Option<f64> {
 }
 
 pub(super) fn median_row_s(run: &RunLog) -> Option<f64> {
-    let mut rows: Vec<f64> = run.t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    rows.sort_by(f64::total_cmp);
-    (run.t_s.len() >= MIN_ROWS).then(|| rows[rows.len() / 2])
+    median(run.t_s.windows(2).map(|pair| pair[1] - pair[0])).filter(|_| run.t_s.len() >= MIN_ROWS)
 }
 
 fn fastest_rad_s(run: &RunLog) -> f64 {
     let rates = |angles: &Vec<f64>| {
-        let mut rates: Vec<f64> =
-            angles.windows(2).zip(run.t_s.windows(2)).map(|(a, t)| (a[1] - a[0]).abs() / (t[1] - t[0])).collect();
-        rates.sort_by(f64::total_cmp);
-        rates.get(rates.len() * 19 / 20).copied().unwrap_or(0.0)
+        let rates = angles.windows(2).zip(run.t_s.windows(2)).map(|(a, t)| (a[1] - a[0]).abs() / (t[1] - t[0]));
+        quantile(rates, 0.95).unwrap_or(0.0)
     };
     rates(&run.wheels.left).max(rates(&run.wheels.right))
 }

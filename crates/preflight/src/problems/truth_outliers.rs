@@ -1,5 +1,7 @@
 //! Positions metres off for a row. They are left out of the checks that follow.
 
+use dataset::quantile;
+
 use crate::kind::Kind;
 use crate::problem::{Problem, Severity};
 use crate::session_check::SessionCheck;
@@ -17,10 +19,8 @@ pub(crate) fn found(check: &mut SessionCheck) {
             far.clear();
         }
         if truth.len() >= MIN_ROWS {
-            let mut steps: Vec<f64> =
-                (1..truth.len()).map(|row| step(row - 1, row)).filter(|step| *step > 0.0).collect();
-            steps.sort_by(f64::total_cmp);
-            let usual = steps.get((steps.len() as f64 * USUAL_STEP_QUANTILE) as usize).copied().unwrap_or(0.0);
+            let steps = (1..truth.len()).map(|row| step(row - 1, row)).filter(|step| *step > 0.0);
+            let usual = quantile(steps, USUAL_STEP_QUANTILE).unwrap_or(0.0);
             let most = (IMPOSSIBLE_STEP_RATIO * usual).max(MIN_OUTLIER_M);
             let jumps = |row: &usize| {
                 let (before, after) = (step(row - 1, *row), step(*row, row + 1));

@@ -9,6 +9,7 @@ use super::text::EXACT_SCALE;
 use super::took::{Basis, Confidence};
 use crate::column_names::Quantity;
 use crate::error::DatasetError;
+use crate::order_statistics::median;
 use crate::unit::Unit;
 
 /// Steps of a log: from what the fastest microcontrollers log to one row in five seconds.
@@ -88,18 +89,15 @@ pub(super) fn unit_of_time(
     if let Some(unit) = Unit::TIMES.into_iter().find(|unit| EPOCH_S.contains(&in_s(first, *unit))) {
         return Ok((unit, Basis::new(Confidence::Certain, format!("a date in {} since 1970", unit.name()))));
     }
-    let mut steps: Vec<f64> = log
+    let steps = log
         .time
         .windows(2)
         .enumerate()
         .filter(|(row, pair)| pair[1] > pair[0] && log.run_of(*row) == log.run_of(row + 1))
-        .map(|(_, pair)| raw(pair[1] - pair[0]))
-        .collect();
-    if steps.is_empty() {
+        .map(|(_, pair)| raw(pair[1] - pair[0]));
+    let Some(step) = median(steps) else {
         return Err(undecided(sheet, "s, ms, us or ns", "with one row it cannot be seen"));
-    }
-    let middle = steps.len() / 2;
-    let step = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+    };
     let span = log.time.iter().max().zip(log.time.iter().min()).map_or(0.0, |(last, first)| raw(last - first));
     if let Some(odometry_s) = known.odometry_s {
         let agrees = |unit: &Unit| (1.0 / SPAN_RATIO..=SPAN_RATIO).contains(&(in_s(span, *unit) / odometry_s));

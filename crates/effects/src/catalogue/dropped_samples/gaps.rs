@@ -3,10 +3,8 @@
 
 use std::ops::Range;
 
-use dataset::{Odometry, Run, Timestamps, WheelLog};
+use dataset::{Odometry, Run, Timestamps, WheelLog, median};
 use kinematics::{Side, Wheels};
-
-use crate::hypothesis::median;
 
 /// Where rows are too few to have a beat: an interval longer than the usual one by this factor is nearer to
 /// two of them. It may be a gap, or a pause of the log, and the counts tell.

@@ -1,7 +1,0 @@
-//! The middle of some values.
-
-/// The middle one, the upper of an even number; `None` of none.
-pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
-}
