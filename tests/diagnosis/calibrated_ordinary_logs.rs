@@ -12,7 +12,7 @@ use std::process::Command;
 use rayon::prelude::*;
 use serde_json::Value;
 
-use crate::ordinary_kinds::{HALF, kinds, robots};
+use crate::ordinary_kinds::{QUARTER, kinds, robots};
 use plain_robot::Change;
 use plain_robot::PlainRobot;
 
@@ -56,7 +56,7 @@ fn lengths_of_ordinary_logs_are_within_their_standard_deviations() {
     let (robots, first) = robots();
     // Each kind has robots of its own, so that one robot's errors are not those of all kinds.
     let seeds = |number: usize| (0..robots).map(move |robot| first + robot + robots * number as u64);
-    let cases: Vec<(&str, Change, u64)> = kinds(HALF)
+    let cases: Vec<(&str, Change, u64)> = kinds(QUARTER)
         .enumerate()
         .flat_map(|(number, (kind, change, _))| seeds(number).map(move |seed| (*kind, *change, seed)))
         .collect();

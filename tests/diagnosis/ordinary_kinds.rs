@@ -13,6 +13,8 @@ pub(crate) fn robots() -> (u64, u64) {
 pub(crate) const HALF: usize = 2;
 /// The same where a row costs seconds.
 pub(crate) const QUARTER: usize = 4;
+/// The same of the most rows.
+pub(crate) const EIGHTH: usize = 8;
 
 /// Kinds whose name has the text of YAIR_KIND in it; one in so many without.
 pub(crate) fn kinds(one_in: usize) -> impl Iterator<Item = &'static Kind> {

@@ -5,8 +5,8 @@ catalogue (`candidates`), reported or refused. Here the effects are ranked by it
 
     python posterior.py --logs DIR --yair PATH [--work DIR]
 
-DIR holds logs with an answer.json each, as `replay` draws them (target/replay/logs/blind/SEED). The threshold of the log odds is
-set on the nulls of the first half of the logs, for 5 % of them with a finding, and all measures are of the second half.
+DIR holds logs with an answer.json each, as `replay` draws them (target/replay/logs/blind/SEED). The threshold of the log odds
+is set on the nulls of the other half of the logs, for 5 % of them with a finding.
 """
 
 import argparse
@@ -76,18 +76,20 @@ def main():
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         documents = list(pool.map(lambda log: diagnosed(arguments.yair, digest, log, arguments.work), logs))
     answers = [json.loads((log / "answer.json").read_text()) for log in logs]
-    cases = [(answer, document) for answer, document in zip(answers, documents) if document is not None]
+    # A single effect is compared with none: where something ordinary must be in the model as well, that says nothing.
+    cases = [(answer, document) for answer, document in zip(answers, documents) if document is not None and not answer["exempt"]]
     halves = cases[: len(cases) // 2], cases[len(cases) // 2 :]
-    print(f"{len(logs)} logs, {len(cases)} diagnosed by {digest}")
-    # What is ordinary about a log may be found, and counts nowhere.
-    best = lambda answer, document: next(of for of in ranked(document) if of[1] not in answer["exempt"])
-    nulls = sorted((best(*case)[0] for case in halves[0] if case[0]["question"] == "null"), reverse=True)
-    threshold = nulls[int(FALSE_ALARMS * len(nulls))]
-    print(f"threshold: log odds {threshold:.2f}, from {len(nulls)} nulls of the first half")
+    print(f"{len(logs)} logs, of which {len(cases)} are diagnosed by {digest} and have nothing exempt")
+    thresholds = []
+    for other in reversed(halves):
+        nulls = sorted((ranked(document)[0][0] for answer, document in other if answer["question"] == "null"), reverse=True)
+        thresholds.append(nulls[int(FALSE_ALARMS * len(nulls))])
+        print(f"threshold: log odds {thresholds[-1]:.2f}, from {len(nulls)} nulls of the other half")
 
     def reported(answer, document):
         causes = [name for cause in answer["causes"] for name in cause["right"]]
-        return [of for of in document["findings"] if any(name in causes or name not in answer["exempt"] for name in of["names"])]
+        is_exempt = lambda of: any(name in answer["exempt"] and name not in causes for name in of["names"])
+        return [of for of in document["findings"] if not is_exempt(of)]
 
     rows = {}
 
@@ -96,9 +98,9 @@ def main():
         rows[measure][way] = hits + bool(hit), all_of + 1
 
     sizes = {}
-    for answer, document in halves[1]:
+    for threshold, (answer, document) in ((of, case) for of, half in zip(thresholds, halves) for case in half):
         ranks, findings = ranked(document), reported(answer, document)
-        top = best(answer, document)
+        top = ranks[0]
         question = answer["question"]
         if question == "null":
             count("nulls with a finding", "reported", findings)
