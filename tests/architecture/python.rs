@@ -13,6 +13,7 @@ fn python_is_built_with_the_workspace_and_nothing_is_built_of_it() {
         assert!(is_of_workspace(&python["package"], key), "{key}");
     }
     assert_eq!(python["lints"]["workspace"].as_bool(), Some(true));
+    assert_eq!(workspace["workspace"]["lints"]["rust"]["unsafe_code"].as_str(), Some("forbid"));
     assert!(
         !python.contains_key("profile")
             && !workspace["workspace"].as_table().expect("a table").contains_key("default-members")

@@ -86,7 +86,7 @@ fn lengths_of_ordinary_logs_are_within_their_standard_deviations() {
     }
     let rms = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
     println!("RMS z of all kinds {rms:.2}");
-    // Of 35 kinds with a robot each the root mean square has a standard deviation of a tenth, and
+    // Of 29 kinds with a robot each the root mean square has a standard deviation of a ninth, and
     // standard deviations that are known to a tenth are customary.
     assert!(complaints.is_empty() && (0.75..1.3).contains(&rms), "{rms} {complaints:#?}");
 }

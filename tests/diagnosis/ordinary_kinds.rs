@@ -13,7 +13,7 @@ pub(crate) fn robots() -> (u64, u64) {
 pub(crate) const HALF: usize = 2;
 /// The same where a row costs seconds.
 pub(crate) const QUARTER: usize = 4;
-/// The same of the most rows.
+/// The same of a long table whose rows cost seconds.
 pub(crate) const EIGHTH: usize = 8;
 
 /// Kinds whose name has the text of YAIR_KIND in it; one in so many without.
