@@ -17,6 +17,7 @@ use anstream::{AutoStream, ColorChoice};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
+use crate::ablation::Ablation;
 use crate::signals::Signals;
 use crate::terminal::{Printed, Terminal, import_command};
 use crate::{
@@ -38,6 +39,10 @@ pub(crate) struct Cli {
     /// No progress, no remarks, and no lines on what was read or written: results and errors alone.
     #[arg(long, global = true)]
     quiet: bool,
+    /// TOML of an ablation: `off`, the rules that are switched off, and `decisions`, a file for how often each
+    /// rule decided.
+    #[arg(long, global = true, hide = true, value_name = "FILE")]
+    settings: Option<PathBuf>,
 }
 
 #[derive(Subcommand)]
@@ -160,6 +165,24 @@ fn with_format(error: clap::Error, grammar: &mut clap::Command) -> clap::Error {
 
 fn run(cli: &Cli, arguments: &[OsString], terminal: &Terminal) -> u8 {
     command_line::keep(arguments);
+    let ablation = match cli.settings.as_deref().map(Ablation::begin).transpose() {
+        Ok(ablation) => ablation,
+        Err(failure) => {
+            terminal.failure(&failure.to_string());
+            return 1;
+        }
+    };
+    let code = run_command(cli, terminal);
+    match ablation.map_or(Ok(()), |ablation| ablation.end()) {
+        Ok(()) => code,
+        Err(failure) => {
+            terminal.failure(&failure.to_string());
+            1
+        }
+    }
+}
+
+fn run_command(cli: &Cli, terminal: &Terminal) -> u8 {
     let Some(command) = &cli.command else {
         terminal.remark(help::first_steps());
         terminal.usage_error("no subcommand is given; yair --help lists them");

@@ -39,6 +39,7 @@ pub use sim_yair;
 
 pub mod command;
 
+mod ablation;
 mod calibrate;
 mod calibration_file;
 mod case_bundle;

@@ -59,6 +59,9 @@ pub struct RobotFiles;
 #[doc = include_str!("../crates/ros-bag/README.md")]
 pub struct RosBag;
 
+#[doc = include_str!("../crates/rules/README.md")]
+pub struct Rules;
+
 #[doc = include_str!("../crates/scenario/README.md")]
 pub struct Scenario;
 

@@ -7,6 +7,8 @@
 //! itself, and what waited behind it. The numbers are the likeliest path through both (Viterbi 1967), each
 //! path with its own idea of how late rows usually are, so that a clock need not keep one beat all day.
 
+use rules::Rule;
+
 use crate::lateness::{LINE_ROWS, is_alone, lateness, lateness_of_ticks};
 use crate::order_statistics::median;
 use crate::packets::Packets;
@@ -75,14 +77,15 @@ impl SamplingPeriod {
         if t_s.len() < MIN_ROWS {
             return None;
         }
-        if let Some(received) = Self::of_packets(t_s).or_else(|| Received::of(t_s)) {
+        let received = Rule::Packets.finds(Self::of_packets(t_s));
+        if let Some(received) = received.or_else(|| Rule::ReceiptDelays.finds(Received::of(t_s))) {
             let late_s: Vec<f64> = t_s.iter().zip(&received.read_s).map(|(t_s, read_s)| t_s - read_s).collect();
             let (period_s, numbers, off_s) = (received.period_s, received.numbers(), root_mean_square(&late_s));
             return Some(Self { period_s, numbers, late_s, is_bunched: true, off_s });
         }
         let gap_s = median(t_s.windows(2).map(|pair| pair[1] - pair[0]))?;
         // The middle gap is exact where stamps are.
-        if let Some(numbers) = numbers_beside_rows_of_their_own(t_s, gap_s) {
+        if let Some(numbers) = Rule::RowsByThemselves.finds(numbers_beside_rows_of_their_own(t_s, gap_s)) {
             return Some(Self {
                 period_s: gap_s,
                 late_s: vec![0.0; numbers.len()],
@@ -113,7 +116,8 @@ impl SamplingPeriod {
             // As many rows are lost, or came by themselves, as were found, and not as few as is usual.
             let Some(other) = Numbered::with(t_s, found.period_s, RowCosts::of(&found.numbers)) else { break };
             let other_late_s = other.lateness(t_s);
-            if root_mean_square(&other_late_s) >= root_mean_square(&late_s) {
+            let is_nearer = root_mean_square(&other_late_s) < root_mean_square(&late_s);
+            if !Rule::NumberingRounds.applies(is_nearer) {
                 break;
             }
             (found, late_s) = (other, other_late_s);

@@ -1,5 +1,6 @@
 //! When the rows of a log were read, and the beat behind that.
 
+use rules::Rule;
 use std::fmt;
 use std::ops::{Deref, DerefMut};
 use std::sync::{Arc, OnceLock};
@@ -24,7 +25,7 @@ impl fmt::Debug for Timestamps {
 impl Timestamps {
     /// The beat behind them; `None` where rows are too few to have one.
     pub fn sampling_period(&self) -> Option<&SamplingPeriod> {
-        self.period.get_or_init(|| SamplingPeriod::of(&self.t_s).map(Arc::new)).as_deref()
+        self.period.get_or_init(|| Rule::SamplingPeriod.finds(SamplingPeriod::of(&self.t_s)).map(Arc::new)).as_deref()
     }
 }
 

@@ -5,6 +5,7 @@
 //! explained by whatever term it pays best.
 
 use dataset::Dataset;
+use rules::Rule;
 
 use crate::clock_profile::{Profile, RunClock};
 use crate::names::run_name;
@@ -66,7 +67,7 @@ pub(crate) fn clock_offsets(datasets: &[Dataset], clocks: &[RunClock], min_commo
         let information: f64 = all.iter().map(|of| of.profile.sigma_s.powi(-2)).sum();
         offsets.push(ClockOffset { runs: None, offset_s: common_s, sigma_s: information.sqrt().recip(), gain });
     }
-    if offsets.is_empty() {
+    if offsets.is_empty() || !Rule::ClockOffsets.applies(true) {
         return Clocks { remaining_s: common_s, ..Clocks::default() };
     }
     let mut records = datasets.to_vec();

@@ -6,6 +6,7 @@ use dataset::Dataset;
 use effects::CATALOGUE;
 use estimation::{EstimationError, FitSettings, ModelFit};
 use rayon::prelude::*;
+use rules::Rule;
 use scenario::Scenario;
 
 use crate::alternatives::{Alternative, alternatives};
@@ -178,7 +179,7 @@ fn diagnose_rows(
     let mut before_fit = BeforeFit { min_common_clock_s: MIN_COMMON_CLOCK_OFFSET_S, events: true };
     let first = match stages(before_fit) {
         // To an instrument that is precise, a clock that is off by less makes most measurements outliers.
-        Err(DiagnoseError::OdometryUncorrelated { .. }) => {
+        Err(DiagnoseError::OdometryUncorrelated { .. }) if Rule::ClockRetry.applies(true) => {
             before_fit.min_common_clock_s = MIN_REJECTING_CLOCK_OFFSET_S;
             stages(before_fit)?
         }
@@ -186,7 +187,7 @@ fn diagnose_rows(
     };
     if first.has_events
         && let Ok(whole) = stages(BeforeFit { events: false, ..before_fit })
-        && whole.explains_events_of(&first)
+        && Rule::WholeWithoutEvents.applies(whole.explains_events_of(&first))
     {
         return Ok(whole.diagnosis);
     }
@@ -232,11 +233,11 @@ fn stages(
     });
     let every_term = mean_terms(&options.without);
     // Stamps that counts show to be wrong by themselves: all else is sought in records that are restamped.
-    let by_counts = stamp_error_by_counts(datasets, &every_term);
+    let by_counts = Rule::StampsByCounts.finds(stamp_error_by_counts(datasets, &every_term));
     let recorded = datasets;
     let datasets = by_counts.as_ref().map_or(datasets, |error| &error.records[..]);
     let of_runs = RunClock::of_all(datasets);
-    let drift = clock_drift(datasets, &of_runs, before_fit.min_common_clock_s);
+    let drift = Rule::ClockDrift.finds(clock_drift(datasets, &of_runs, before_fit.min_common_clock_s));
     let (datasets, of_runs) = drift.as_ref().map_or((datasets, &of_runs), |found| (&found.records[..], &found.clocks));
     let clocks = clock_offsets(datasets, of_runs, before_fit.min_common_clock_s);
     let datasets = clocks.records.as_deref().unwrap_or(datasets);
@@ -246,17 +247,17 @@ fn stages(
     begins(Step::RecordFaults);
     // Record faults and the base fit. One fault may mask another, so that a second is sought after the first.
     let as_recorded = EVERY_MEASUREMENT.fit(&sessions(datasets));
-    let outlying = as_recorded.as_ref().is_ok_and(|base| {
+    let outlying = Rule::VisibleFaultsOnly.applies(as_recorded.as_ref().is_ok_and(|base| {
         rejected_share(base) > MAX_REJECTED_FRACTION && measurements_per_run(base) < MIN_MEASUREMENTS_PER_RUN
-    });
-    let first = fault(datasets, as_recorded.as_ref().ok(), &options.without, outlying);
+    }));
+    let first = Rule::RecordFault.finds(fault(datasets, as_recorded.as_ref().ok(), &options.without, outlying));
     let second;
     let (records, base, faults): (&[Dataset], ModelFit<'_>, Vec<&Fault>) = match &first {
         None => (datasets, as_recorded?, Vec::new()),
         Some(first) => {
             let base = EVERY_MEASUREMENT.fit(&sessions(&first.records))?;
             let without = [&options.without[..], &[first.id.to_owned()]].concat();
-            second = fault(&first.records, Some(&base), &without, false);
+            second = Rule::SecondRecordFault.finds(fault(&first.records, Some(&base), &without, false));
             match &second {
                 None => (&first.records, base, vec![first]),
                 Some(second) => {
@@ -270,12 +271,12 @@ fn stages(
     let base = correlated_base(records, base);
     // Stamps that are wrong: everything that comes from them is sought in records that are restamped.
     let sought = by_counts.is_none() && is_correlated(&base, &[]);
-    let error = sought.then(|| stamp_error(records, &base, &every_term)).flatten();
+    let error = Rule::StampsByResiduals.finds(sought.then(|| stamp_error(records, &base, &every_term)).flatten());
     let whole = || by_counts.is_none().then(|| whole_stamp_error(records, &base, &every_term)).flatten();
-    let error = error.or_else(whole);
+    let error = error.or_else(|| Rule::WholeStamps.finds(whole()));
     let restamped = error.as_ref().and_then(|error| {
         let fit = correlated_base(&error.records, EVERY_MEASUREMENT.fit(&sessions(&error.records)).ok()?);
-        error.is_undone_by(&fit).then_some((error, fit))
+        (!Rule::StampsUndone.applies(!error.is_undone_by(&fit))).then_some((error, fit))
     });
     let with_stamps = (by_counts.is_some() && faults.is_empty()).then(|| with_rows_of(records, recorded));
     let (stamps, as_stamped, records, base) = match restamped {
@@ -286,7 +287,8 @@ fn stages(
         }
     };
     let is_open = |candidate: &Candidate| {
-        stamps.is_none_or(|error| error.candidate.id() != candidate.id()) && !extrinsics::has_instead(&base, candidate)
+        stamps.is_none_or(|error| error.candidate.id() != candidate.id())
+            && !Rule::ExtrinsicsInstead.applies(extrinsics::has_instead(&base, candidate))
     };
     let mut catalogue: Vec<Candidate> = every_term.into_iter().filter(is_open).collect();
     let mut structure = mean_structure(records, base, &catalogue);
@@ -424,7 +426,7 @@ fn correlated_base<'a>(records: &'a [Dataset], base: ModelFit<'a>) -> ModelFit<'
         return base;
     }
     match THINNED.fit(&sessions(records)) {
-        Ok(thinned) if determines_wheels(&thinned, &[]) => thinned,
+        Ok(thinned) if Rule::ThinnedIfUncorrelated.applies(determines_wheels(&thinned, &[])) => thinned,
         _ => base,
     }
 }

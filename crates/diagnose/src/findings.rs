@@ -3,6 +3,7 @@
 
 use dataset::Dataset;
 use effects::GeometryRatio;
+use rules::Rule;
 
 use crate::anomaly_findings::of_anomalies;
 use crate::carry_over::CarryOver;
@@ -108,7 +109,8 @@ fn record_faults(results: &StageResults<'_, '_>, _: Vec<Finding>) -> Vec<Finding
 fn extrinsics(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
     // Extrinsics of a motion that is not the robot's are none.
     if !results.uncorrelated {
-        findings.extend(extrinsics::of_model(results.structure.model(), results.without));
+        let found = extrinsics::of_model(results.structure.model(), results.without);
+        findings.extend(found.into_iter().filter(|_| Rule::ExtrinsicsFound.applies(true)));
     }
     findings
 }
@@ -150,7 +152,9 @@ fn stamps(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Fin
 
 /// What all stamps are late by, which the instrument's clock shows.
 fn mean_lateness(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    let before = findings.clone();
     join_clock(&mut findings, results.stamps, results.recorded);
+    findings = Rule::MeanLateness.changes(before, findings);
     findings
 }
 
@@ -177,7 +181,10 @@ fn noise_effects(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> 
         findings.push(finding::of_uncorrelated(&results.structure.base));
     } else if !results.restored() {
         let mut signs = scatter(results.structure, results.recorded, results.without);
-        signs.retain(|sign| !findings.iter().any(|finding| sign.names(finding.first())));
+        signs.retain(|sign| {
+            let is_named = findings.iter().any(|finding| sign.names(finding.first()));
+            !Rule::NamedAlready.applies(is_named)
+        });
         findings.extend(signs);
     }
     findings
@@ -197,7 +204,7 @@ fn faults_of_the_log(results: &StageResults<'_, '_>, mut findings: Vec<Finding>)
         let is_autocorrelated = |finding: &Finding| matches!(finding.basis, Basis::Autocorrelated(..));
         let may_be_rest =
             |finding: &&mut Finding| finding.is_certain() || (is_autocorrelated(finding) && !finding.has_unlisted());
-        for finding in findings.iter_mut().filter(may_be_rest) {
+        for finding in findings.iter_mut().filter(may_be_rest).filter(|_| Rule::OtherGeometryDoubts.applies(true)) {
             finding.or_unlisted(1.0, Doubt::OtherGeometry);
         }
     }
@@ -213,7 +220,9 @@ fn faults_of_the_log(results: &StageResults<'_, '_>, mut findings: Vec<Finding>)
         // Where times are in other units, a record fault may be an accident too.
         let sound = spans.is_none_or(|check| check.passes);
         for finding in &mut findings[if sound { faults.len() } else { 0 }..] {
-            finding.or_unlisted(1.0, Doubt::FaultyRecords);
+            if Rule::FaultyRecordsDoubt.applies(true) {
+                finding.or_unlisted(1.0, Doubt::FaultyRecords);
+            }
         }
     }
     findings.extend(nameless);
@@ -230,7 +239,8 @@ fn failed_checks(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> 
     if !(results.restored() || scatters || is_reported) {
         let refusals = structure.found.refusals.iter();
         let refused = refusals.filter(|(_, refusal)| refusal.is_for_other_runs()).map(|(id, _)| *id);
-        findings.extend(finding::of_failed_checks(&structure.checked, results.without, refused));
+        let failed = finding::of_failed_checks(&structure.checked, results.without, refused);
+        findings.extend(Rule::FailedChecks.finds(failed));
     }
     findings
 }
@@ -239,14 +249,18 @@ fn failed_checks(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> 
 /// it.
 fn without_errors_of_form(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
     let least_z = form_error_statistic(results.structure.model()).sqrt();
-    findings.retain(|finding| !finding.basis.may_be_error_of_form() || finding.z >= least_z);
+    findings.retain(|finding| {
+        let is_error = finding.basis.may_be_error_of_form() && finding.z < least_z;
+        !Rule::WithoutErrorsOfForm.applies(is_error)
+    });
     findings
 }
 
 fn doubt_parts_of_stronger_findings(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
     let full = results.structure.found.model.candidates.len() >= MAX_EFFECTS;
+    let before = findings.clone();
     finding::doubt(&mut findings[results.faults.len()..], full);
-    findings
+    Rule::PartOfStronger.changes(before, findings)
 }
 
 /// Effects whose data have another form than they have, and an uncatalogued term that is significant beside
@@ -262,11 +276,15 @@ fn doubt_incomplete_models(results: &StageResults<'_, '_>, mut findings: Vec<Fin
     for (index, deviation) in left.of_forms {
         let has_exact_form = model.candidates[index].has_exact_form();
         if let Some(finding) = findings.iter_mut().find(|finding| finding.term == Some(index)) {
-            finding::or_of_other_form(finding, deviation, has_exact_form);
+            let mut doubted = finding.clone();
+            finding::or_of_other_form(&mut doubted, deviation, has_exact_form);
+            *finding = Rule::OtherForm.changes(finding.clone(), doubted);
         }
     }
     if let Some(product) = left.of_products {
+        let before = findings.clone();
         finding::or_incomplete(&mut findings, product);
+        findings = Rule::Incomplete.changes(before, findings);
     }
     findings
 }
@@ -277,13 +295,17 @@ fn without_what_doubts_say(_: &StageResults<'_, '_>, mut findings: Vec<Finding>)
     let is_incomplete = |doubt: &Doubt| matches!(doubt, Doubt::Incomplete | Doubt::OtherForm(_));
     let incomplete = findings.iter().filter(|finding| finding.doubts.iter().any(is_incomplete));
     let plainest = incomplete.map(|finding| finding.z).fold(0.0, f64::max);
-    findings.retain(|finding| !matches!(finding.basis, Basis::FailedTests(_)) || finding.z >= plainest);
+    findings.retain(|finding| {
+        let is_less_plain = matches!(finding.basis, Basis::FailedTests(_)) && finding.z < plainest;
+        !Rule::WithoutWhatDoubtsSay.applies(is_less_plain)
+    });
     findings
 }
 
 fn doubt_low_significance(_: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    let before = findings.clone();
     finding::or_of_low_significance(&mut findings);
-    findings
+    Rule::LowSignificance.changes(before, findings)
 }
 
 /// A term that some session or kind of path does not have as the others give it shares its place: what else
@@ -292,7 +314,7 @@ fn doubt_what_does_not_carry_over(results: &StageResults<'_, '_>, mut findings: 
     for finding in &mut findings {
         finding.carry_over = finding.term.and_then(|term| results.carry_over.get(term)).cloned();
         let is_refuted = finding.carry_over.as_ref().is_some_and(|of| of.carries_over == Some(false));
-        if is_refuted && !finding.is_unlisted() {
+        if Rule::DoesNotCarryOver.applies(is_refuted && !finding.is_unlisted()) {
             finding.or_unlisted(1.0, Doubt::DoesNotCarryOver);
         }
     }
@@ -301,8 +323,9 @@ fn doubt_what_does_not_carry_over(results: &StageResults<'_, '_>, mut findings: 
 
 /// What the instrument's map explains by its errors, which return with the place.
 fn without_errors_of_the_map(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
+    let before = findings.clone();
     without_systematic_errors(&mut findings, &results.structure.base, results.structure.model());
-    findings
+    Rule::SystematicErrors.changes(before, findings)
 }
 
 /// Stamps that were set right only roughly, or that a term explains which does not know of which tick all
@@ -318,7 +341,10 @@ fn without_remainders_of_stamps(results: &StageResults<'_, '_>, mut findings: Ve
         None => findings.iter().any(is_of_late_stamps) && have_uncertain_rows(results.recorded),
     };
     if are_rough {
-        findings.retain(|finding| finding.is_of_stamps() || !finding.has_unlisted());
+        findings.retain(|finding| {
+            let is_remainder = !finding.is_of_stamps() && finding.has_unlisted();
+            !Rule::RemaindersOfStamps.applies(is_remainder)
+        });
     }
     findings
 }

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use estimation::ModelFit;
+use rules::Rule;
 
 use crate::augmented_model::{AugmentedModel, others, refit, without};
 use crate::candidate::Candidate;
@@ -32,7 +33,11 @@ impl<'a> FitCache<'a> {
             let scored = scan(&model.fit, &model.candidates, &left);
             let unresolved = self.unresolved.get_or_insert_with(|| unresolved(&model.fit, &model.candidates, &scored));
             let resolved = |scored: Scored| {
-                if unresolved.contains(&scored.candidate) { scored.unresolved() } else { scored }
+                if Rule::Unresolved.applies(unresolved.contains(&scored.candidate)) {
+                    scored.unresolved()
+                } else {
+                    scored
+                }
             };
             self.scans.push((model.candidates.clone(), scored.into_iter().map(resolved).collect()));
             self.scans.len() - 1

@@ -7,6 +7,7 @@
 
 use dataset::Dataset;
 use estimation::{FitSettings, ModelFit};
+use rules::Rule;
 
 use crate::augmented_model::AugmentedModel;
 use crate::candidate::{Candidate, terms};
@@ -119,7 +120,7 @@ struct MeanSearch<'a> {
 fn search_and_thin<'a>(datasets: &'a [Dataset], base: ModelFit<'a>, catalogue: &[Candidate]) -> MeanSearch<'a> {
     let AmongAll { base, model, autocorrelation } = search_among_all(base, catalogue);
     let spurious = autocorrelation.as_ref().is_some_and(|of| of.spurious);
-    let lasting = autocorrelation.filter(|of| of.lasts);
+    let lasting = autocorrelation.filter(|of| Rule::ThinIfAutocorrelated.applies(of.lasts));
     match lasting.and_then(|of| Thinned::beside(datasets, &base, &model.found.model, of)) {
         Some(thinned) => {
             drop((base, model)); // their fits are large
@@ -159,7 +160,11 @@ impl<'a> Thinned<'a> {
         let beside =
             has_effects.then(|| base.thinned_beside(&found.fit, &mut terms(&found.candidates))?.ok()).flatten();
         let each = [thinned(datasets, base.clone()), beside];
-        let base = each.into_iter().flatten().min_by(|a, b| a.spacing_s().total_cmp(&b.spacing_s()))?;
+        let is_nearer = |beside: &ModelFit<'_>, alone: &ModelFit<'_>| beside.spacing_s() < alone.spacing_s();
+        let base = match each {
+            [Some(alone), Some(beside)] if Rule::ThinnedBesideEffects.applies(is_nearer(&beside, &alone)) => beside,
+            [alone, beside] => alone.or(beside)?,
+        };
         Some(Self { base, autocorrelation })
     }
 
@@ -196,6 +201,7 @@ fn search_among_all<'a>(base: ModelFit<'a>, catalogue: &[Candidate]) -> AmongAll
     // If no effect explains them, but residuals depend on something: sparse terms among all measurements.
     let unexplained = model.has_outliers() && model.found.model.candidates.is_empty() && model.shows_dependence();
     let terms = open.filter(|_| unexplained).and_then(|open| UncataloguedTerms::ungated_terms((&base, &open)));
+    let terms = Rule::UngatedTerms.finds(terms);
     let model = match terms {
         Some(unlisted) => model.with_terms(unlisted),
         None => model,
@@ -213,7 +219,7 @@ fn autocorrelation_by_part(
     base: &ModelFit<'_>,
     catalogue: &[Candidate],
 ) -> Option<Autocorrelation> {
-    let part = part_of_runs(datasets, base)?;
+    let part = Rule::AutocorrelationByPart.finds(part_of_runs(datasets, base))?;
     let beside_none = check(&AugmentedModel::base(base));
     if is_white(&beside_none) {
         return None;
@@ -242,6 +248,7 @@ fn search_ungated_if_outliers<'a>(
     let is_sought = model.has_outliers() || outliers(base) > outliers(&model.found.model.fit);
     let open = if is_sought { base.refit_ungated().ok() } else { None };
     let ungated = open.as_ref().and_then(|open| search_ungated((base, open), &model.found, catalogue));
+    let ungated = Rule::UngatedSearch.finds(ungated);
     (ungated.map_or(model, MeanModel::of_effects), open)
 }
 
@@ -249,7 +256,7 @@ fn search_ungated_if_outliers<'a>(
 /// effects beside it: motion that stamps do not tell resembles effects that grow with speed.
 fn search_beside_timing_noise<'a>(base: ModelFit<'a>, catalogue: &[Candidate]) -> (ModelFit<'a>, MeanModel<'a>) {
     let found = search(&base, catalogue, SCAN_LEVEL, FitCache::default());
-    match noisy_base(&base, &found.model) {
+    match Rule::TimingNoise.finds(noisy_base(&base, &found.model)) {
         None => (base, MeanModel::of_effects(found)),
         Some(noisy) => {
             drop((base, found)); // their fits are large
@@ -286,8 +293,9 @@ fn compare_with_sparse<'a>(base: &ModelFit<'a>, model: MeanModel<'a>) -> MeanMod
     // The prior of an uncatalogued cause is lower.
     let more = unnamed + finding::uncatalogued_log_odds() - named;
     let margin = margin_over_units(named, likeliest, &model.found.model);
-    let Some(term) = finding.filter(|_| more > margin) else {
-        let competing = Some(odds_within(more, margin).min(1.0)).filter(|_| more > -MIN_LOG_ODDS_MARGIN);
+    let Some(term) = finding.filter(|_| Rule::TermInstead.applies(more > margin)) else {
+        let is_close = Rule::CompetingTerm.applies(more > -MIN_LOG_ODDS_MARGIN);
+        let competing = Some(odds_within(more, margin).min(1.0)).filter(|_| is_close);
         return MeanModel { competing, ..model };
     };
     let instead = UncataloguedTerms::from(base, term);
@@ -310,7 +318,9 @@ fn explain_autocorrelation<'a>(base: ModelFit<'a>, model: MeanModel<'a>) -> Amon
         .and_then(|search| search.best_prediction(SPARSE_TERM_LEVEL));
     let tried = best.map(|sparse| (check(&sparse.model), sparse));
     let spurious = tried.as_ref().is_some_and(|(_, sparse)| sparse.certain && sparse.drifts_more);
+    let spurious = Rule::SpuriousTerm.applies(spurious);
     let explains = tried.filter(|(checked, sparse)| !sparse.drifts_more && (is_white(checked) || sparse.certain));
+    let explains = Rule::TermsExplainAutocorrelation.finds(explains);
     let lasts = explains.is_none();
     let model = match explains {
         Some((_, sparse)) => model.with_terms(UncataloguedTerms::from(&base, sparse)),
@@ -326,7 +336,8 @@ fn search_if_dependent<'a>(base: &ModelFit<'a>, model: MeanModel<'a>, catalogue:
         return model;
     }
     let found = search(base, catalogue, SCAN_LEVEL_IF_DEPENDENT, model.found.known.clone());
-    if found.model.candidates.len() <= model.found.model.candidates.len() {
+    let is_more = found.model.candidates.len() > model.found.model.candidates.len();
+    if !Rule::SearchIfDependent.applies(is_more) {
         return model;
     }
     // What the first search refused, or what is of low significance, is one candidate cause among others.
@@ -338,7 +349,7 @@ fn terms_if_dependent<'a>(base: &ModelFit<'a>, model: MeanModel<'a>) -> MeanMode
     if model.unlisted.is_some() || !model.shows_dependence() {
         return model;
     }
-    match sparse(base, &model.found.model, SPARSE_TERM_LEVEL) {
+    match Rule::TermsIfDependent.finds(sparse(base, &model.found.model, SPARSE_TERM_LEVEL)) {
         Some(term) => model.with_terms(UncataloguedTerms::from(base, term)),
         None => model,
     }

@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 use dataset::Dataset;
 use effects::Sign;
 use estimation::NoiseComponent;
+use rules::Rule;
 
 use crate::augmented_model::{AugmentedModel, cost, count};
 use crate::candidate::terms;
@@ -44,12 +45,13 @@ pub(crate) fn scatter(structure: &MeanStructure<'_>, recorded: &[Dataset], witho
     }
     // Autocorrelated errors, with what they are while the robot stands: an instrument errs then, too, unless
     // its errors go with the place.
-    let autocorrelated = structure
-        .correlated
-        .filter(|(coefficient, _)| *coefficient > 0.0)
-        .map(|(coefficient, sigmas)| (coefficient, sigmas, errors_at_rest(recorded, coefficient)));
+    let autocorrelated =
+        structure.correlated.filter(|(coefficient, _)| *coefficient > 0.0).map(|(coefficient, sigmas)| {
+            let at_rest = errors_at_rest(recorded, coefficient);
+            (coefficient, sigmas, Rule::ErrorsAtRest.changes(ErrorsAtRest::Autocorrelated, at_rest))
+        });
     let may_be_motions = autocorrelated.is_some_and(|(.., at_rest)| at_rest != ErrorsAtRest::Autocorrelated);
-    let turns = of_turns(structure, without_ids);
+    let turns = Rule::TurnScatter.finds(of_turns(structure, without_ids));
     let p_of_dependence = tests.iter().filter(|test| test.shows_dependence());
     let p_of_dependence = p_of_dependence.map(|test| test.p_value).fold(1.0, f64::min);
     let tails = tests.iter().filter(|test| matches!(test.check, Check::Tails(_) | Check::Outliers));
@@ -58,10 +60,10 @@ pub(crate) fn scatter(structure: &MeanStructure<'_>, recorded: &[Dataset], witho
     // After the end of a run nothing follows that could be back.
     let has_successors =
         structure.base.selections.first().is_some_and(|taken| taken.mean_measurements(&structure.base.records) >= 2.0);
-    if has_successors
+    let are_isolated = has_successors
         && outliers.p_value < NOISE_EFFECT_LEVEL
-        && outliers.isolated >= ISOLATED_TO_PERSISTENT_RATIO * outliers.persistent
-    {
+        && outliers.isolated >= ISOLATED_TO_PERSISTENT_RATIO * outliers.persistent;
+    if Rule::IsolatedErrors.applies(are_isolated) {
         let share = outliers.isolated as f64 / (outliers.measurements + rejected) as f64;
         let value = Value { value: share, sigma: None, unit: "1".to_owned() };
         let of = outliers.measurements + rejected;
@@ -74,7 +76,7 @@ pub(crate) fn scatter(structure: &MeanStructure<'_>, recorded: &[Dataset], witho
         let basis = Basis::IsolatedErrors(outliers.isolated, of);
         findings.push(finding::of_causes(causes, outliers.p_value, parameters, basis));
     }
-    if is_dependent {
+    if Rule::DependentResiduals.applies(is_dependent) {
         // Large errors that depend on what was driven are no noise effect. Turn scatter correlates with
         // everything that turns, but less than its own significance.
         findings.extend(turns.filter(|turns| turns.p_value < p_of_dependence));
@@ -94,7 +96,7 @@ pub(crate) fn scatter(structure: &MeanStructure<'_>, recorded: &[Dataset], witho
             let p_value = fails.map(|test| test.p_value).or(has_outliers.then_some(outliers.p_value))?;
             Some((p_value, residual_persistence(&structure.found.model, number), sign))
         });
-        if let Some((p_value, persistence, sign)) = jump {
+        if let Some((p_value, persistence, sign)) = Rule::LargeErrors.finds(jump) {
             let named = |signs: &[Sign]| {
                 let mut ids: Vec<&'static str> = Vec::new();
                 for id in signs.iter().flat_map(|sign| finding::with_sign(*sign, without_ids)) {
@@ -173,7 +175,7 @@ fn p_of_turn_scatter(model: &AugmentedModel<'_>) -> Option<f64> {
     let differ = |model: &AugmentedModel<'_>| [differs_from_run_to_run(model), differs_from_turn_to_turn(model)];
     let mut p_values = differ(model).to_vec();
     let may_be_found = p_values.iter().any(|p_value| *p_value < TURN_SCATTER_LEVEL);
-    if let Some(null) = NullDistribution::of(model).filter(|_| may_be_found) {
+    if let Some(null) = NullDistribution::of(model).filter(|_| Rule::TurnScatterAmongSimulated.applies(may_be_found)) {
         let simulated =
             null.resimulated(|fit| differ(&AugmentedModel { fit: fit.clone(), candidates: model.candidates.clone() }));
         for (test, p_value) in p_values.iter_mut().enumerate() {

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use estimation::ModelFit;
 use nalgebra::DVector;
+use rules::Rule;
 use serde::Serialize;
 
 use crate::augmented_model::{AugmentedModel, cost, count, refit, refit_each};
@@ -96,13 +97,13 @@ pub(crate) fn rivals<'a>(
     };
     let mut fits = fit_each(&best_variants);
     let impossible = |extended: &AugmentedModel<'_>| {
-        if !is_physical(extended, index) {
+        if Rule::Unphysical.applies(!is_physical(extended, index)) {
             return Some(Refusal::Unphysical);
         }
-        if !is_plausible(extended, index) {
+        if Rule::Implausible.applies(!is_plausible(extended, index)) {
             return Some(Refusal::Implausible);
         }
-        (!keeps_wheels(&without.fit, &extended.fit)).then_some(Refusal::OtherWheels)
+        Rule::OtherWheels.applies(!keeps_wheels(&without.fit, &extended.fit)).then_some(Refusal::OtherWheels)
     };
     let is_possible = |extended: &AugmentedModel<'_>| impossible(extended).is_none();
     // Another variant that explains about as much may have physical sizes.
@@ -114,6 +115,9 @@ pub(crate) fn rivals<'a>(
     for variant in 0..MAX_FURTHER_VARIANTS {
         let next: Vec<Candidate> =
             contenders.iter().filter_map(|entry| entry.others(close).nth(variant)).cloned().collect();
+        if Rule::FurtherVariants.finds(next.first()).is_none() {
+            break;
+        }
         fits.extend(fit_each(&next));
         contenders.retain(|entry| !can_be(&fits, entry));
     }
@@ -154,7 +158,7 @@ pub(crate) fn rivals<'a>(
         refusal.is_none()
     });
     if let Some((name, _)) = named.first_mut() {
-        name.outdone = best > name.log_odds + log_odds_margin(name.log_odds);
+        name.outdone = Rule::Outdone.applies(best > name.log_odds + log_odds_margin(name.log_odds));
     }
     named
 }

@@ -1,6 +1,7 @@
 //! Forward selection over the catalogue with refits, and the causes that the data do not discriminate.
 
 use estimation::ModelFit;
+use rules::Rule;
 
 use crate::augmented_model::AugmentedModel;
 use crate::cancellation::effects_cancel;
@@ -57,8 +58,14 @@ fn grown<'a>(
 ) -> Option<AugmentedModel<'a>> {
     let (tests, index) = (tests_in(&entries), model.candidates.len());
     for _ in 0..MAX_CANDIDATES_TRIED {
-        let best = most_significant(&entries, tests, level)
-            .or_else(|| significant_once_refitted((base, &mut *known), model, &entries, (tests, level)))?;
+        let best = most_significant(&entries, tests, level).or_else(|| {
+            Rule::SignificantOnceRefitted.finds(significant_once_refitted(
+                (base, &mut *known),
+                model,
+                &entries,
+                (tests, level),
+            ))
+        })?;
         let (id, statistic) = (best.scored.candidate.id(), best.scored.statistic);
         let found = rivals((base, &mut *known), model, index, &entries, statistic, refusals);
         let refuted = match found.into_iter().next().filter(|(name, _)| name.log_odds > 0.0) {
@@ -100,7 +107,7 @@ fn possible_rivals<'a>(
             return found;
         }
         open.retain(|entry| !refusals.get(entry.scored.candidate.id()).is_some_and(|refusal| refusal.is_impossible()));
-        if open.len() == left {
+        if !Rule::RivalsOfTheRest.applies(open.len() != left) {
             return found;
         }
     }
@@ -129,8 +136,8 @@ fn without_what_cancels<'a>(
         })
         .collect();
     let all: Vec<&'static str> = model.candidates.iter().map(Candidate::id).collect();
-    subsets.retain(|subset| !effects_cancel(subset));
-    let all_cancel = effects_cancel(&model);
+    subsets.retain(|subset| !Rule::Cancellation.applies(effects_cancel(subset)));
+    let all_cancel = Rule::Cancellation.applies(effects_cancel(&model));
     // A single effect cancels nothing, but may have no fit of its own.
     if !all_cancel || subsets.is_empty() {
         subsets.push(model);
@@ -146,7 +153,12 @@ fn without_what_cancels<'a>(
             sizes.then(odds[b].total_cmp(&odds[a]))
         })
         .unwrap_or(subsets.len() - 1);
-    let chosen = subsets.swap_remove(fewest);
+    let is_subset = subsets[fewest].candidates.len() < effects;
+    let whole = subsets.iter().position(|subset| subset.candidates.len() == effects);
+    let chosen = match whole {
+        Some(whole) if !Rule::SmallestSubset.applies(is_subset) => subsets.swap_remove(whole),
+        _ => subsets.swap_remove(fewest),
+    };
     if all_cancel {
         let left: Vec<&'static str> = chosen.candidates.iter().map(Candidate::id).collect();
         refusals.extend(all.into_iter().filter(|id| !left.contains(id)).map(|id| (id, Refusal::Cancels)));
@@ -166,14 +178,20 @@ fn confirm(
     let confirms =
         |inflation: f64| p_value_over(extended, index, inflation).is_some_and(|p_value| p_value * tests <= level);
     // Coarse encoders make no size more significant.
-    if !(confirms(1.0) && confirms(known.inflation_of(without, &extended.candidates[index]))) {
+    if Rule::RefitConfirms.applies(!confirms(1.0)) {
+        return Err(Refusal::NotConfirmed);
+    }
+    if confirms(1.0) && Rule::Inflation.applies(!confirms(known.inflation_of(without, &extended.candidates[index]))) {
         return Err(Refusal::NotConfirmed);
     }
     // Nor is an effect of a few runs. Where turns scatter from run to run, everything correlated with turns
     // seems significant: it must be significant over the runs alone.
     let scattered = differs_from_run_to_run(extended) < TURN_SCATTER_LEVEL;
-    let over_runs = if scattered { level / tests } else { CLUSTER_ROBUST_LEVEL };
-    if cluster_robust_test(extended, index, over_runs) { Ok(()) } else { Err(Refusal::NotOverRuns) }
+    if Rule::OverRuns.applies(!cluster_robust_test(extended, index, CLUSTER_ROBUST_LEVEL)) {
+        return Err(Refusal::NotOverRuns);
+    }
+    let fails_there = scattered && !cluster_robust_test(extended, index, level / tests);
+    if Rule::OverScatteredRuns.applies(fails_there) { Err(Refusal::NotOverRuns) } else { Ok(()) }
 }
 
 /// The most significant effect of a scan, if it is significant at a family-wise level over so many tests
@@ -193,7 +211,7 @@ fn is_not_discriminated(causes: &[(f64, f64)]) -> Vec<bool> {
     let top = causes.first().map_or(0.0, |(log_odds, _)| *log_odds);
     let most = causes.iter().map(|(_, explains)| *explains).fold(f64::MIN, f64::max);
     let is_close = |(log_odds, explains): &(f64, f64)| {
-        *log_odds > top - log_odds_margin(top) || *explains > most - log_odds_margin(most)
+        *log_odds > top - log_odds_margin(top) || Rule::ExplainsAsMuch.applies(*explains > most - log_odds_margin(most))
     };
     causes.iter().map(is_close).collect()
 }
@@ -205,8 +223,10 @@ fn scale_differences_of_delays(causes: &mut [(Name, AugmentedModel<'_>)]) {
     let Some(((first, first_model), others)) = causes.split_first_mut() else { return };
     for (name, model) in others.iter_mut().filter(|(name, _)| name.candidate.is_delay() && first.candidate.is_delay()) {
         let scatter = margin_over_units(0.0, first_model, model);
-        name.log_odds = with_scaled_difference(name.log_odds, first.log_odds, scatter);
-        name.explains = with_scaled_difference(name.explains, most, scatter);
+        let odds = with_scaled_difference(name.log_odds, first.log_odds, scatter);
+        if Rule::DelayScatter.applies(odds != name.log_odds) {
+            (name.log_odds, name.explains) = (odds, with_scaled_difference(name.explains, most, scatter));
+        }
     }
 }
 
@@ -230,7 +250,7 @@ pub(crate) fn search<'a>(
         }
         // What is no more than the error of a larger effect's form is none beside it.
         let form_error = form_error_statistic(&model);
-        entries.retain(|entry| entry.scored.statistic >= form_error);
+        entries.retain(|entry| entry.scored.statistic >= form_error || !Rule::FormErrorInScan.applies(true));
         let Some(extended) = grown((base, &mut known), &model, entries, level, &mut refusals) else { break };
         model = extended;
     }
@@ -256,13 +276,15 @@ pub(crate) fn search<'a>(
         // A term that predicts held-out runs worse, or with which odometry drifts significantly more, is
         // refused. It is tested beside the others: alone, a part of a larger effect may predict worse.
         let refusal = gain(&without, &found[0].1).ok().and_then(|gain| {
-            if gain.predicts_worse() {
+            if Rule::PredictsWorse.applies(gain.predicts_worse()) {
                 return Some(Refusal::PredictsWorse);
             }
-            gain.drifts_more_by(MAX_DRIFT_INCREASE_INTERVALS).then_some(Refusal::DriftsMore)
+            let drifts_more = Rule::DriftsMore.applies(gain.drifts_more_by(MAX_DRIFT_INCREASE_INTERVALS));
+            drifts_more.then_some(Refusal::DriftsMore)
         });
         // Where no cause that replaced it is significant either, it is not confirmed.
-        let unconfirmed = || (!found.iter().any(is_significant)).then_some(Refusal::NotConfirmed);
+        let unconfirmed =
+            || Rule::Unconfirmed.applies(!found.iter().any(is_significant)).then_some(Refusal::NotConfirmed);
         if let Some(refusal) = refusal.or_else(unconfirmed) {
             refusals.insert(found[0].0.candidate.id(), refusal);
             model = without;
@@ -273,7 +295,9 @@ pub(crate) fn search<'a>(
         let mut kept = is_not_discriminated(&odds).into_iter();
         found.retain(|_| kept.next().unwrap_or(false));
         names.push(found.iter().map(|(name, _)| name.clone()).collect());
-        beside.extend(over_names(index, &found));
+        if found.len() > 1 && Rule::SpreadOverCauses.applies(true) {
+            beside.extend(over_names(index, &found));
+        }
         model = found.swap_remove(0).1;
         index += 1;
     }
@@ -291,7 +315,8 @@ pub(crate) fn search<'a>(
     // Candidates that stood in for a variant that is fitted now are not needed any more.
     let tests = tests_in(&first_scan);
     for index in (0..names.len()).rev() {
-        if wald_test(&model, index).is_some_and(|(test, _)| test.p_value * tests <= level) {
+        let is_significant = wald_test(&model, index).is_some_and(|(test, _)| test.p_value * tests <= level);
+        if !Rule::InsignificantAtTheEnd.applies(!is_significant) {
             continue;
         }
         if let Some(without) = known.without(base, &model, index) {

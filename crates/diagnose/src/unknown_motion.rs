@@ -20,6 +20,7 @@ use self::other_extrinsics::{OtherExtrinsics, other_extrinsics};
 use crate::names::run_name;
 use crate::pose_windows::{CalibratedTracks, PoseTrack};
 use crate::settings::records::{MAX_UNKNOWN_EVENTS_PER_RUN, MAX_UNKNOWN_SHARE};
+use rules::Rule;
 
 /// What does not belong, where, and by how much.
 #[derive(Debug, Clone, PartialEq)]
@@ -58,7 +59,10 @@ pub(crate) fn unknown_motions(
         .into_par_iter()
         .map(|track| limits.events(&calibrated, track, calibrated.body_from_sensor))
         .collect();
-    let otherwise = other_extrinsics(&calibrated, &limits, &of_tracks);
+    let mut otherwise = other_extrinsics(&calibrated, &limits, &of_tracks);
+    if Rule::OtherExtrinsics.finds(otherwise.first()).is_none() {
+        otherwise.clear();
+    }
     let is_left_out = |track: usize| otherwise.iter().any(|(of, _)| *of == track);
     let mut events: Vec<(usize, Event)> = Vec::new();
     for (track, of) in of_tracks.into_iter().enumerate().filter(|(track, _)| !is_left_out(*track)) {
@@ -72,6 +76,9 @@ pub(crate) fn unknown_motions(
         || spoiled as f64 > MAX_UNKNOWN_SHARE * pairs as f64
         || events.len() as f64 > MAX_UNKNOWN_EVENTS_PER_RUN * minutes.max(tracks.len() as f64)
     {
+        events.clear();
+    }
+    if Rule::UnknownMotions.finds(events.first()).is_none() {
         events.clear();
     }
     if events.is_empty() && otherwise.is_empty() {

@@ -8,6 +8,7 @@
 use kinematics::{Kernel, Pose, Twist, Wheels, sin_cos, wrap_to_pi};
 use model_term::ModelTerm;
 use nalgebra::{Matrix3, Vector3, Vector4};
+use rules::Rule;
 
 use crate::covariances::{Covariance, Covariances};
 use crate::derivatives::Derivatives;
@@ -100,10 +101,10 @@ impl Kernel for FilterRun<'_, '_, '_> {
             filter.outliers.push(propagation.measurement);
             rejected_in_a_row += 1;
             // Without a heading the filter cannot start in the middle of a segment.
-            if rejected_in_a_row >= RESTART_AFTER_OUTLIERS
+            let restarts = rejected_in_a_row >= RESTART_AFTER_OUTLIERS
                 && filter.segment.measurements[propagation.measurement].theta_rad.is_some()
-                && filter.segment.start == Start::MeasuredPose
-            {
+                && filter.segment.start == Start::MeasuredPose;
+            if Rule::RestartAfterOutliers.applies(restarts) {
                 filter.start_at(
                     (number + 1, propagation.measurement),
                     propagation.intervals.end,
@@ -415,7 +416,7 @@ impl<'f, 'a> Filter<'f, 'a> {
             covariance.lower(&gain, &ph);
             *update = Update { row, gain, v, s };
         }
-        if self.pass_options.gate == OutlierGate::On && distance > OUTLIER_CHI_SQUARE {
+        if Rule::OutlierGate.applies(self.pass_options.gate == OutlierGate::On && distance > OUTLIER_CHI_SQUARE) {
             return false;
         }
         self.timing.add(&TimingScore::of(error_by, velocity_by), 1.0);

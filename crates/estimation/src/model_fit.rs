@@ -8,6 +8,7 @@ use kinematics::Pose;
 use model_term::ModelTerm;
 use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen, Vector3};
 use rayon::prelude::*;
+use rules::Rule;
 
 use crate::error::EstimationError;
 use crate::model::{Column, Model};
@@ -136,7 +137,9 @@ impl ModelFit<'_> {
     /// The first fit. The extrinsics of a sensor of positions are free where it is elsewhere than at the
     /// drive's centre by the dead-reckoned paths, and by the fit: what the paths show may be another effect.
     pub(crate) fn first_fit(&mut self) -> Result<(), EstimationError> {
-        let Some([x_m, y_m]) = self.records.sensor_position_m(&self.start) else { return self.refit(None, &mut []) };
+        let Some([x_m, y_m]) = Rule::SensorPosition.finds(self.records.sensor_position_m(&self.start)) else {
+            return self.refit(None, &mut []);
+        };
         let centred = self.clone();
         self.start.body_from_sensor = Pose::new(x_m, y_m, self.start.body_from_sensor.theta_rad);
         self.columns.extend(self.records.extrinsics());
@@ -270,7 +273,7 @@ impl ModelFit<'_> {
     pub(crate) fn fix_unobservable(&mut self) -> Result<(), EstimationError> {
         let Some(information) = self.solution.information(&self.columns) else { return Ok(()) };
         let directions = with_stated_wheels(unobservable(&information.matrix), self.records.is_partial());
-        if directions.is_empty() {
+        if !Rule::FixUnobservable.applies(!directions.is_empty()) {
             let was_fixed = !std::mem::take(&mut self.unobservable).is_empty();
             // A direction that has become observable is free again.
             return if was_fixed { self.refit(Some(self.current_values()), &mut []) } else { Ok(()) };

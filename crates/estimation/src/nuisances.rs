@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use kinematics::Pose;
 use nalgebra::DVector;
+use rules::Rule;
 
 use crate::error::EstimationError;
 use crate::model::{Column, GroupExtrinsics, Grouping, Instrument};
@@ -88,10 +89,10 @@ pub(crate) fn add_nuisances(fit: &mut ModelFit<'_>, gate: OutlierGate) -> Result
     // Autocorrelated errors are common to the blocks of a run, so that blocks are no held-out data for each
     // other.
     if runs.len() > 1 && (gate == OutlierGate::Off || (fit.thinning == Thinning::NONE && fit.is_white())) {
-        groupings.push(Some(Grouping::Run));
+        groupings.extend(Rule::NuisancesOfGroups.finds(Some(Some(Grouping::Run))));
     }
     if runs.iter().any(|run| run.run.0 != runs[0].run.0) {
-        groupings.push(Some(Grouping::Session));
+        groupings.extend(Rule::NuisancesOfGroups.finds(Some(Some(Grouping::Session))));
     }
     let mut best: Option<AcceptedNuisances> = None;
     for grouping in groupings {
@@ -110,7 +111,8 @@ pub(crate) fn add_nuisances(fit: &mut ModelFit<'_>, gate: OutlierGate) -> Result
             let gains: Vec<f64> = before.costs.iter().zip(&found.costs).map(|(base, set)| base - set).collect();
             let Some((mean, error)) = mean_and_error(&gains) else { continue };
             let drifts = set != &[Column::Latency] && found.drifts_beside(&base);
-            if mean > MIN_HELD_OUT_GAIN_SIGMA * error && !drifts {
+            let gains_enough = mean > MIN_HELD_OUT_GAIN_SIGMA * error;
+            if gains_enough && !Rule::NuisancesDrift.applies(drifts) {
                 let gain = base.costs.iter().zip(&found.costs).map(|(base, set)| base - set).sum();
                 of_grouping = Some(AcceptedNuisances { gain, columns, own, held_out: found });
             }
@@ -121,7 +123,7 @@ pub(crate) fn add_nuisances(fit: &mut ModelFit<'_>, gate: OutlierGate) -> Result
             best = Some(accepted);
         }
     }
-    if let Some(AcceptedNuisances { columns, own, .. }) = best {
+    if let Some(AcceptedNuisances { columns, own, .. }) = Rule::Nuisances.finds(best) {
         let before = fit.clone();
         let mut from = fit.current_values();
         // The refit starts at the step that all measurements ask for: from zero, the gate could reject what
@@ -143,7 +145,7 @@ pub(crate) fn add_nuisances(fit: &mut ModelFit<'_>, gate: OutlierGate) -> Result
         fit.refit(Some(from), &mut [])?;
         // Nuisances that hide the geometry explain it away: a latency that has left the run, at which nothing
         // that was measured meets a motion.
-        if hidden_directions(fit) > hidden_directions(&before) {
+        if Rule::NuisancesHide.applies(hidden_directions(fit) > hidden_directions(&before)) {
             *fit = before;
         }
     }
@@ -195,7 +197,11 @@ pub(crate) fn explained_by_nuisances<'a>(
     let outliers = |fit: &ModelFit<'_>| fit.solution.pass.outliers.len();
     let has_fewer_outliers = MIN_OUTLIER_REDUCTION * outliers(&explained) < outliers(&plain);
     let is_thinned_less = MIN_THINNING_REDUCTION * explained.thinning.every_s < plain.thinning.every_s;
-    Ok(if has_fewer_outliers || is_thinned_less { Explained::Yes(explained) } else { Explained::No { thinned: plain } })
+    Ok(if Rule::NuisancesExplain.applies(has_fewer_outliers || is_thinned_less) {
+        Explained::Yes(explained)
+    } else {
+        Explained::No { thinned: plain }
+    })
 }
 
 /// Cross-validation of some columns and of the groups' own: for each fold, one step on the other folds,

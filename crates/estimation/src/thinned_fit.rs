@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use dataset::median;
 use model_term::ModelTerm;
+use rules::Rule;
 
 use crate::error::EstimationError;
 use crate::model::Column;
@@ -29,6 +30,7 @@ impl ModelFit<'_> {
         let mut has_converged = true;
         loop {
             let wider = if self.is_white() { None } else { self.thinned(THINNING_FACTOR * every_s, between_s) };
+            let wider = Rule::Thinning.finds(wider);
             if wider.is_none() && has_converged {
                 return Ok(());
             }

@@ -1,0 +1,97 @@
+"""What each rule is worth: how often it decides, and what the same logs come to without it (docs/ablation.md).
+
+    python ablation.py --logs DIR... --yair PATH --replay PATH [--rules RULE...] [--most N] [--work DIR]
+
+DIR holds logs with an answer.json each, as `replay` draws them. One run of every log counts the decisions of each rule. Then
+each rule is switched off by itself on at most N of the logs in which it decided, and `replay` compares the two builds there.
+A rule that never decided is not run. Results are kept in the working folder by the digest of the executable.
+"""
+
+import argparse
+import hashlib
+import json
+import os
+import random
+import subprocess
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+# The same logs whenever a rule is asked again.
+SEED = 66
+
+
+def decisions(yair, log, work):
+    """How often each rule decided in a log."""
+    name = hashlib.sha256(str(log.resolve()).encode()).hexdigest()[:16]
+    kept = work / "decisions" / f"{name}.json"
+    if not kept.exists():
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        settings = kept.with_suffix(".toml")
+        settings.write_text(f'decisions = "{kept}.new"\n')
+        answer = json.loads((log / "answer.json").read_text())
+        sessions = sorted(str(folder) for folder in (log / "training").iterdir())
+        without = [word for effect in answer.get("without", []) for word in ("--without", effect)]
+        command = [yair, "diagnose", "--settings", str(settings), *sessions, *without, "--json", "--quiet"]
+        subprocess.run(command, capture_output=True, env={**os.environ, "RAYON_NUM_THREADS": "1"})
+        settings.unlink()
+        written = Path(f"{kept}.new")
+        written.rename(kept) if written.exists() else kept.write_text("{}")
+    return json.loads(kept.read_text())
+
+
+def without_rule(arguments, rule, logs, work):
+    """The table of `replay` on some logs, with a rule and without it."""
+    kept = work / "without" / f"{rule}.json"
+    if not kept.exists():
+        corpus = work / "corpora" / rule
+        corpus.mkdir(parents=True, exist_ok=True)
+        for log in logs:
+            link = corpus / f"{log.parent.name}-{log.name}"
+            if not link.is_symlink():
+                link.symlink_to(log.resolve())
+        settings = work / f"{rule}.toml"
+        settings.write_text(f'off = ["{rule}"]\n')
+        command = [arguments.replay, arguments.yair, f"{arguments.yair} --settings {settings}", "--corpus", str(corpus)]
+        command += ["--cases", "0", "--robots", "0", "--mixed", "0", "--store", str(work / "store"), "--json"]
+        ran = subprocess.run(command, capture_output=True, check=False)
+        if ran.returncode != 0:
+            return None
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        kept.write_bytes(ran.stdout)
+    return json.loads(kept.read_text())
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--logs", type=Path, nargs="+", required=True)
+    parser.add_argument("--yair", required=True)
+    parser.add_argument("--replay", required=True)
+    parser.add_argument("--rules", nargs="*")
+    parser.add_argument("--most", type=int, default=150, help="logs of a rule at the most")
+    parser.add_argument("--work", type=Path, default=Path("target/ablation"))
+    arguments = parser.parse_args()
+    digest = hashlib.sha256(Path(arguments.yair).read_bytes()).hexdigest()[:12]
+    work = (arguments.work / digest).resolve()
+    logs = sorted(file.parent for folder in arguments.logs for file in folder.glob("*/answer.json"))
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        counts = list(pool.map(lambda log: decisions(arguments.yair, log, work), logs))
+    deciding = {}
+    for log, of_rules in zip(logs, counts):
+        for rule in of_rules:
+            deciding.setdefault(rule, []).append(log)
+    print(f"{len(logs)} logs")
+    for rule, its_logs in sorted(deciding.items(), key=lambda item: len(item[1])):
+        print(f"{rule}: decides in {len(its_logs)} ({100 * len(its_logs) / len(logs):.1f} %)", flush=True)
+        if arguments.rules is not None and rule not in arguments.rules:
+            continue
+        chosen = random.Random(SEED).sample(its_logs, min(arguments.most, len(its_logs)))
+        table = without_rule(arguments, rule, chosen, work)
+        if table is None:
+            print("    replay failed")
+            continue
+        for row in table["all"]:
+            print("   ", json.dumps(row), flush=True)
+
+
+if __name__ == "__main__":
+    main()
