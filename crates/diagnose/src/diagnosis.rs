@@ -9,35 +9,37 @@ use rayon::prelude::*;
 use rules::Rule;
 use scenario::Scenario;
 
-use crate::alternatives::{Alternative, alternatives};
-use crate::augmented_model::{AugmentedModel, refit};
-use crate::candidate::{Candidate, mean_terms};
+use crate::candidates::candidate::{Candidate, mean_terms};
 use crate::carry_over::{CarryOver, carry_over};
-use crate::check::TestResult;
-use crate::clock_drift::clock_drift;
-use crate::clock_offsets::clock_offsets;
-use crate::clock_profile::RunClock;
-use crate::detectability::detectability;
+use crate::checks::check::TestResult;
+use crate::checks::residuals::{Residuals, residuals};
 use crate::document::{Document, Gain};
-use crate::extrinsics;
-use crate::finding::Finding;
-use crate::findings::{StageResults, findings};
+use crate::findings::alternatives::{Alternative, alternatives};
+use crate::findings::detectability::detectability;
+use crate::findings::extrinsics;
+use crate::findings::finding::Finding;
+use crate::findings::stages::{StageResults, findings};
+use crate::fits::augmented_model::{AugmentedModel, refit};
 use crate::gain::{gain_by_level, held_out_drift};
-use crate::large_log::LargeLog;
-use crate::log_rows::{check_rows, check_spans};
-use crate::mean_structure::{THINNED, mean_structure};
-use crate::names::session_names;
 use crate::plan::{Limits, next_experiment};
-use crate::record_faults::{Fault, determines_wheels, fault, is_correlated, rejected_share, sessions};
-use crate::residuals::{Residuals, residuals};
+use crate::records::clock_drift::clock_drift;
+use crate::records::clock_offsets::clock_offsets;
+use crate::records::clock_profile::RunClock;
+use crate::records::large_log::LargeLog;
+use crate::records::log_rows::{check_rows, check_spans};
+use crate::records::names::session_names;
+use crate::records::record_faults::{Fault, determines_wheels, fault, is_correlated, rejected_share, sessions};
+use crate::records::stamp_errors::{
+    stamp_error, stamp_error_by_counts, uncertain_tick_s, whole_stamp_error, with_rows_of,
+};
+use crate::records::unknown_motion::{AnomalyKind, unknown_motions};
+use crate::search::mean_structure::{THINNED, mean_structure};
 use crate::settings::large_log::MAX_RUNS;
 use crate::settings::records::{
     MAX_REJECTED_FRACTION, MIN_COMMON_CLOCK_OFFSET_S, MIN_MEASUREMENTS_PER_RUN, MIN_REJECTING_CLOCK_OFFSET_S,
 };
 use crate::stage::{OnStage, Step};
-use crate::stamp_errors::{stamp_error, stamp_error_by_counts, uncertain_tick_s, whole_stamp_error, with_rows_of};
 use crate::text;
-use crate::unknown_motion::{AnomalyKind, unknown_motions};
 
 /// What to leave out of the catalogue, and the limits of the next experiment.
 #[derive(Debug, Clone)]
@@ -136,7 +138,7 @@ impl FittedModel {
     /// Its terms, in their initial states.
     #[must_use]
     pub fn terms(&self) -> Vec<Box<dyn model_term::ModelTerm>> {
-        crate::candidate::terms(&self.candidates)
+        crate::candidates::candidate::terms(&self.candidates)
     }
 }
 
@@ -366,7 +368,7 @@ fn stages(
             next_experiment(records, (&structure.base, &structure.found), (model, &catalogue, &blind_to), limits)
         }
     };
-    let extended = crate::extended_scenario::scenario_of(records, &datasets[0].robot, &faults, stamps, &carried);
+    let extended = crate::gain::extended_scenario::scenario_of(records, &datasets[0].robot, &faults, stamps, &carried);
     begins(Step::Residuals);
     let residuals = residuals(&structure.base, model);
     let alternatives = alternatives(&structure.found, stamps, &findings);
@@ -464,6 +466,6 @@ fn with_candidates<'a>(
 
 /// The calibration with what was found in the model.
 fn calibration(datasets: &[Dataset], extended: &AugmentedModel<'_>) -> Result<Calibration, CalibError> {
-    let covariance = extended.fit.covariance(&mut crate::candidate::terms(&extended.candidates));
+    let covariance = extended.fit.covariance(&mut crate::candidates::candidate::terms(&extended.candidates));
     calibrated_drive(&extended.fit, covariance.as_ref(), datasets[0].robot.ticks_per_rev)
 }

@@ -10,9 +10,9 @@ use dataset::{
 use estimation::{FitSettings, ModelFit};
 use kinematics::{Increment, Pose, Wheels};
 
-use crate::augmented_model::{AugmentedModel, refit};
-use crate::candidate::Candidate;
-use crate::record_faults::sessions;
+use crate::candidates::candidate::Candidate;
+use crate::fits::augmented_model::{AugmentedModel, refit};
+use crate::records::record_faults::sessions;
 
 #[path = "../../estimation/src/tests/golden_numbers.rs"]
 mod golden_numbers;

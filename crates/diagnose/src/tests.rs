@@ -7,30 +7,30 @@ use dataset::{Dataset, Run, TruthSample, WheelLog};
 use estimation::{Model, ModelFit, Noise};
 use kinematics::Wheels;
 
-use crate::augmented_model::{AugmentedModel, cost, count, left_out_cost};
-use crate::candidate::{Candidate, mean_terms};
-use crate::detectability::detectability;
-use crate::extended_scenario::SamplingStatistics;
-use crate::fit_cache::FitCache;
+use crate::candidates::candidate::{Candidate, mean_terms};
+use crate::candidates::physical::is_physical;
+use crate::checks::residual_tests::{check, residual_persistence};
+use crate::checks::residuals::residuals;
+use crate::checks::run_to_run::differs_from_run_to_run;
+use crate::checks::turn_to_turn::differs_from_turn_to_turn;
+use crate::findings::detectability::detectability;
+use crate::findings::geometry_deviations::{keeps_wheels, remaining_deviations};
+use crate::findings::lack_of_fit::lack_of_fit;
+use crate::fits::augmented_model::{AugmentedModel, cost, count, left_out_cost};
+use crate::fits::fit_cache::FitCache;
+use crate::fits::model_comparison::{form_error_statistic, log_bayes_factor, margin_over_units};
+use crate::fits::null_distribution::NullDistribution;
+use crate::fits::profile::fit_variant;
+use crate::fits::scan::scan;
+use crate::fits::wald::{cluster_robust_test, p_value_over, tests_of};
+use crate::gain::extended_scenario::SamplingStatistics;
 use crate::gain::gain_by_level;
-use crate::geometry_deviations::{keeps_wheels, remaining_deviations};
-use crate::lack_of_fit::lack_of_fit;
-use crate::model_comparison::{form_error_statistic, log_bayes_factor, margin_over_units};
-use crate::null_distribution::NullDistribution;
-use crate::part_of_runs::part_of_runs;
-use crate::physical::is_physical;
-use crate::profile::fit_variant;
-use crate::record_faults::sessions;
-use crate::residual_tests::{check, residual_persistence};
-use crate::residuals::residuals;
-use crate::run_to_run::differs_from_run_to_run;
-use crate::scan::scan;
-use crate::selection::{search, search_ungated};
+use crate::records::part_of_runs::part_of_runs;
+use crate::records::record_faults::sessions;
+use crate::search::selection::{search, search_ungated};
+use crate::search::sparse_terms::SparseSearch;
 use crate::settings::levels::SCAN_LEVEL;
 use crate::small_robot::{assert_unmoved, effect, fitted, session, with_effects};
-use crate::sparse_terms::SparseSearch;
-use crate::turn_to_turn::differs_from_turn_to_turn;
-use crate::wald::{cluster_robust_test, p_value_over, tests_of};
 use crate::{Options, diagnose};
 
 /// A robot whose right wheel seems larger in every other run, so that runs differ.
@@ -159,7 +159,7 @@ fn regress_no_number_of_a_variant_that_is_fitted_moves() {
     for variants in of_grids.take(3) {
         let candidate = variants[variants.len() / 2].clone();
         let none = AugmentedModel::base(&base);
-        let Some(mut model) = crate::augmented_model::refit(&base, &none, vec![candidate]) else { continue };
+        let Some(mut model) = crate::fits::augmented_model::refit(&base, &none, vec![candidate]) else { continue };
         let extra_sigma = fit_variant(&base, &mut model, 0);
         let held: Vec<(&str, f64)> = model.candidates[0].fixed();
         writeln!(text, "{} {held:?} {extra_sigma:?} {:?}", variants[0].id(), model.estimates(0).as_slice())

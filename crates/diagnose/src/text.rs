@@ -4,16 +4,16 @@ use std::collections::BTreeMap;
 
 use effects::GeometryRatio;
 
-use crate::alternatives::{Alternative, Status};
+use crate::candidates::cause::{Basis, Cause, Doubt};
+use crate::carry_over::heterogeneity::Heterogeneity;
 use crate::carry_over::{CarryOver, Level};
-use crate::cause::{Basis, Cause, Doubt};
-use crate::check::{Check, ResidualPersistence};
+use crate::checks::check::{Check, ResidualPersistence};
+use crate::checks::errors_at_rest::ErrorsAtRest;
 use crate::document::{self, Gain, GainLevel, Subsample, UnlistedTerm, Value, Verdict};
-use crate::errors_at_rest::ErrorsAtRest;
-use crate::finding::Finding;
-use crate::heterogeneity::Heterogeneity;
+use crate::findings::alternatives::{Alternative, Status};
+use crate::findings::finding::Finding;
+use crate::records::unknown_motion::{Anomaly, AnomalyKind};
 use crate::settings::findings::MAX_EVENTS_SHOWN;
-use crate::unknown_motion::{Anomaly, AnomalyKind};
 
 /// A finding as scripts get it.
 pub(crate) fn finding(finding: &Finding) -> document::Finding {

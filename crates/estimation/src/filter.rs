@@ -8,7 +8,6 @@
 use kinematics::{Kernel, Pose, Twist, Wheels, sin_cos, wrap_to_pi};
 use model_term::ModelTerm;
 use nalgebra::{Matrix3, Vector3, Vector4};
-use rules::Rule;
 
 use crate::covariances::{Covariance, Covariances};
 use crate::derivatives::Derivatives;
@@ -104,7 +103,7 @@ impl Kernel for FilterRun<'_, '_, '_> {
             let restarts = rejected_in_a_row >= RESTART_AFTER_OUTLIERS
                 && filter.segment.measurements[propagation.measurement].theta_rad.is_some()
                 && filter.segment.start == Start::MeasuredPose;
-            if Rule::RestartAfterOutliers.applies(restarts) {
+            if rules::Rule::RestartAfterOutliers.applies(restarts) {
                 filter.start_at(
                     (number + 1, propagation.measurement),
                     propagation.intervals.end,
@@ -416,7 +415,8 @@ impl<'f, 'a> Filter<'f, 'a> {
             covariance.lower(&gain, &ph);
             *update = Update { row, gain, v, s };
         }
-        if Rule::OutlierGate.applies(self.pass_options.gate == OutlierGate::On && distance > OUTLIER_CHI_SQUARE) {
+        if rules::Rule::OutlierGate.applies(self.pass_options.gate == OutlierGate::On && distance > OUTLIER_CHI_SQUARE)
+        {
             return false;
         }
         self.timing.add(&TimingScore::of(error_by, velocity_by), 1.0);

@@ -4,8 +4,8 @@ use dataset::{Dataset, NominalRobot, Run, WheelLog};
 use kinematics::{Point, Pose, Rule};
 use scenario::{Budget, Instrument, Scenario};
 
-use crate::augmented_model::AugmentedModel;
-use crate::extended_scenario::SamplingStatistics;
+use crate::fits::augmented_model::AugmentedModel;
+use crate::gain::extended_scenario::SamplingStatistics;
 use crate::settings::findings::STANDING_READING_INTERVAL_S;
 use crate::settings::plan::{CLEARANCE_SEPARATIONS, DEFAULT_ACCELERATION_M_S2, HANDLING_S, MINUTES};
 

@@ -18,9 +18,9 @@ use super::manoeuvres::{Manoeuvre, Part, equations_of, library};
 use super::rival_odds::{Frame, with_parts, with_runs};
 use super::text;
 use super::text::Predictions;
-use crate::augmented_model::AugmentedModel;
-use crate::candidate::{Candidate, mean_terms, terms};
+use crate::candidates::candidate::{Candidate, mean_terms, terms};
 use crate::document::{Blind, NextExperiment, Smallest};
+use crate::fits::augmented_model::AugmentedModel;
 use crate::settings::levels::DETECTION_SQRT_LAMBDA;
 use crate::settings::plan::{
     GEOMETRY_PRECISION_VALUE, MAX_MANOEUVRES, MAX_PLANNED_VARIANTS, MIN_COVERAGE_GAIN, MIN_NOISE_SIGMA,

@@ -10,11 +10,11 @@ use super::predict::predictions;
 use super::rival_odds::{Confidence, Frame, RivalColumns, Rivals, with_parts, with_runs};
 use super::text;
 use super::text::Predictions;
-use crate::augmented_model::without;
-use crate::candidate::{Candidate, terms};
+use crate::candidates::candidate::{Candidate, terms};
 use crate::document::NextExperiment;
-use crate::finding::is_of_low_significance;
-use crate::selection::SearchResult;
+use crate::findings::finding::is_of_low_significance;
+use crate::fits::augmented_model::without;
+use crate::search::selection::SearchResult;
 use crate::settings::levels::LOW_SIGNIFICANCE_SIGMAS;
 use crate::settings::plan::{MAX_RUN_PAIRS, TWO_MANOEUVRES_TIME_RATIO};
 

@@ -10,7 +10,7 @@ use motion_programs::{Cost, Motion, MotionProgram, Schedule};
 use rayon::prelude::*;
 
 use super::constraints::{Reading, Setting};
-use crate::candidate::{Candidate, terms};
+use crate::candidates::candidate::{Candidate, terms};
 use crate::settings::plan::{MIN_MANOEUVRE_LENGTH_M, SIZE_FRACTIONS, SPEED_FRACTIONS, SPIN_REVOLUTIONS, STANDSTILL_S};
 
 /// A pair of runs, one in each direction, at one speed.

@@ -16,10 +16,10 @@ mod text;
 use dataset::Dataset;
 use estimation::ModelFit;
 
-use crate::augmented_model::AugmentedModel;
-use crate::candidate::Candidate;
+use crate::candidates::candidate::Candidate;
 use crate::document::{Blind, NextExperiment};
-use crate::selection::SearchResult;
+use crate::fits::augmented_model::AugmentedModel;
+use crate::search::selection::SearchResult;
 
 pub use crate::settings::plan::{HANDLING_S, MINUTES};
 use constraints::Setting;

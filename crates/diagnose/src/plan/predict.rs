@@ -12,9 +12,9 @@ use super::constraints::Setting;
 use super::manoeuvres::{Measurements, Part, Where, of_runs, phase_rad, planned_run};
 use super::rival_odds::Rivals;
 use super::text;
-use crate::augmented_model::AugmentedModel;
-use crate::candidate::{Candidate, terms};
+use crate::candidates::candidate::{Candidate, terms};
 use crate::document::{Predicted, Value};
+use crate::fits::augmented_model::AugmentedModel;
 use crate::settings::plan::{DERIVATIVE_STEP_SIGMAS, PREDICTION_INSTANTS, SINGLE_MEASUREMENT_SIGMAS, WHEEL_PHASES};
 
 /// What the robot does at one instant of one kind of run: mean, covariance by what is not known of the

@@ -9,8 +9,8 @@ use estimation::{Column, ModelFit, NormalEquations, RIDGE, inverse};
 use nalgebra::{DMatrix, DVector};
 
 use super::manoeuvres::{Manoeuvre, Part};
-use crate::candidate::Candidate;
-use crate::model_comparison::log_odds_margin;
+use crate::candidates::candidate::Candidate;
+use crate::fits::model_comparison::log_odds_margin;
 use crate::settings::levels::{NORMAL_QUANTILE_ONE_SIDED_95, SENSOR_HEADING_PRIOR_SIGMA_RAD};
 use crate::settings::plan::{
     DESIGN_POINT_STEPS, GEOMETRY_PRIOR_SIGMA, GYRO_SCALE_PRIOR_SIGMA, LATENCY_PRIOR_SIGMA_S, LEVER_PRIOR_SIGMA_M,
@@ -225,7 +225,7 @@ pub(crate) fn with_parts(
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::statistics::p_of_z;
+    use crate::fits::statistics::p_of_z;
 
     /// Normal equations of measurements whose derivatives by the columns are the rows of `slopes`, each with
     /// unit variance, and of measured values.

@@ -1,10 +1,10 @@
 //! What is said of findings, to the letter.
 
 use super::*;
-use crate::check::Component;
+use crate::checks::check::Component;
+use crate::checks::errors_at_rest::ErrorsAtRest;
 use crate::document::Compared;
-use crate::errors_at_rest::ErrorsAtRest;
-use crate::geometry_deviation::GeometryDeviation;
+use crate::findings::geometry_deviation::GeometryDeviation;
 use effects::Covariate;
 use kinematics::Pose;
 

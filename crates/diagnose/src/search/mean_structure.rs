@@ -1,0 +1,356 @@
+//! The mean model: which effects and sparse terms a base fit needs.
+//!
+//! Stages, each a function of the results before it: search, ungated search, ungated sparse terms,
+//! comparison with one sparse term, thinning of autocorrelated measurements, search at a higher level,
+//! sparse terms beside the effects. Once sparse terms are found, the stages after that leave the model as
+//! it is.
+
+use dataset::Dataset;
+use estimation::{FitSettings, ModelFit};
+use rules::Rule;
+
+use crate::candidates::candidate::{Candidate, terms};
+use crate::checks::check::{Check, TestResult};
+use crate::checks::residual_tests::{Checked, check};
+use crate::findings::finding;
+use crate::fits::augmented_model::AugmentedModel;
+use crate::fits::fit_cache::FitCache;
+use crate::fits::model_comparison::{log_bayes_factor, margin_over_units, odds_within};
+use crate::records::part_of_runs::part_of_runs;
+use crate::records::record_faults::sessions;
+use crate::search::selection::{SearchResult, search, search_ungated};
+use crate::search::sparse_terms::{SparseSearch, UncataloguedTerms, sparse};
+use crate::settings::levels::{MIN_LOG_ODDS_MARGIN, SCAN_LEVEL, SPARSE_TERM_LEVEL};
+use crate::settings::search::{AUTOCORRELATION_SIGMAS, MIN_AUTOCORRELATION, SCAN_LEVEL_IF_DEPENDENT};
+
+pub(crate) const THINNED: FitSettings = FitSettings { nuisances: false, thin: true, thin_displacements: true };
+
+fn is_white(checked: &Checked) -> bool {
+    let (coefficient, sigmas) = checked.correlation;
+    coefficient.abs() < MIN_AUTOCORRELATION || (sigmas.abs() < AUTOCORRELATION_SIGMAS && !checked.autocorrelated)
+}
+
+/// The mean model after the search: the effects found, uncatalogued terms, and the tests of the residuals
+/// that are left.
+pub(crate) struct MeanStructure<'a> {
+    pub(crate) base: ModelFit<'a>,
+    pub(crate) found: SearchResult<'a>,
+    pub(crate) checked: Checked,
+    pub(crate) unlisted: Option<UncataloguedTerms<'a>>,
+    /// Correlation of successive measurements, where they were thinned: coefficient, and standard errors.
+    pub(crate) correlated: Option<(f64, f64)>,
+    /// A sparse term made measurements certainly likelier though odometry drifts more with it: another
+    /// cause is present.
+    pub(crate) spurious: bool,
+    /// Posterior odds of one uncatalogued term against all named effects; `None` if none is named or it
+    /// replaced them.
+    pub(crate) competing: Option<f64>,
+}
+
+impl<'a> MeanStructure<'a> {
+    /// The model with all that was found.
+    pub(crate) fn model(&self) -> &AugmentedModel<'a> {
+        self.unlisted.as_ref().map_or(&self.found.model, |unlisted| &unlisted.model)
+    }
+}
+
+/// What a stage hands to the next one: effects, sparse terms where any are needed, and the tests of the
+/// residuals left.
+struct MeanModel<'a> {
+    found: SearchResult<'a>,
+    unlisted: Option<UncataloguedTerms<'a>>,
+    checked: Checked,
+    competing: Option<f64>,
+}
+
+impl<'a> MeanModel<'a> {
+    fn of_effects(found: SearchResult<'a>) -> Self {
+        Self { checked: check(&found.model), found, unlisted: None, competing: None }
+    }
+
+    fn with_terms(self, unlisted: UncataloguedTerms<'a>) -> Self {
+        Self { checked: check(&unlisted.model), unlisted: Some(unlisted), ..self }
+    }
+
+    /// Whether more measurements are outliers than the noise model predicts.
+    fn has_outliers(&self) -> bool {
+        self.checked.checks.iter().any(|test| test.check == Check::Outliers && !test.passes)
+    }
+
+    /// Whether residuals depend on a recorded quantity.
+    fn shows_dependence(&self) -> bool {
+        self.checked.checks.iter().any(TestResult::shows_dependence)
+    }
+}
+
+/// Searches the mean model of a base fit.
+pub(crate) fn mean_structure<'a>(
+    datasets: &'a [Dataset],
+    base: ModelFit<'a>,
+    catalogue: &[Candidate],
+) -> MeanStructure<'a> {
+    let by_part = autocorrelation_by_part(datasets, &base, catalogue);
+    let MeanSearch { base, model, correlated, spurious } = match by_part {
+        Some(autocorrelation) => {
+            let whole = base.clone().without_innovations(); // most of its memory
+            match Thinned::of(datasets, base, autocorrelation) {
+                Some(thinned) => thinned.search(catalogue),
+                None => search_and_thin(datasets, whole.with_innovations(&mut []).into_owned(), catalogue),
+            }
+        }
+        None => search_and_thin(datasets, base, catalogue),
+    };
+    let model = search_if_dependent(&base, model, catalogue);
+    let model = terms_if_dependent(&base, model);
+    let MeanModel { found, unlisted, checked, competing } = model;
+    MeanStructure { base, found, checked, unlisted, correlated, spurious, competing }
+}
+
+/// A base fit and the model found beside it, thinned if need be; `correlated` and `spurious` as in
+/// [`MeanStructure`].
+struct MeanSearch<'a> {
+    base: ModelFit<'a>,
+    model: MeanModel<'a>,
+    correlated: Option<(f64, f64)>,
+    spurious: bool,
+}
+
+/// A search among all measurements, and another one among thinned ones where the residuals stay
+/// autocorrelated.
+fn search_and_thin<'a>(datasets: &'a [Dataset], base: ModelFit<'a>, catalogue: &[Candidate]) -> MeanSearch<'a> {
+    let AmongAll { base, model, autocorrelation } = search_among_all(base, catalogue);
+    let spurious = autocorrelation.as_ref().is_some_and(|of| of.spurious);
+    let lasting = autocorrelation.filter(|of| Rule::ThinIfAutocorrelated.applies(of.lasts));
+    match lasting.and_then(|of| Thinned::beside(datasets, &base, &model.found.model, of)) {
+        Some(thinned) => {
+            drop((base, model)); // their fits are large
+            thinned.search(catalogue)
+        }
+        None => MeanSearch { base, model, correlated: None, spurious },
+    }
+}
+
+/// A base fit of thinned measurements, and why they are thinned.
+struct Thinned<'a> {
+    base: ModelFit<'a>,
+    autocorrelation: Autocorrelation,
+}
+
+/// A base fit, thinned until what it leaves is white.
+fn thinned<'a>(datasets: &'a [Dataset], base: ModelFit<'a>) -> Option<ModelFit<'a>> {
+    base.thinned_further().unwrap_or_else(|| THINNED.fit(&sessions(datasets))).ok()
+}
+
+impl<'a> Thinned<'a> {
+    /// At the spacing at which what the base fit leaves is white.
+    fn of(datasets: &'a [Dataset], base: ModelFit<'a>, autocorrelation: Autocorrelation) -> Option<Self> {
+        Some(Self { base: thinned(datasets, base)?, autocorrelation })
+    }
+
+    /// At the spacing at which what is left beside the effects found among all measurements is white, where
+    /// that is less. Errors that alternate, as of displacements that share a scan, may show beside the
+    /// effects alone: wider than without them nothing is thinned.
+    fn beside(
+        datasets: &'a [Dataset],
+        base: &ModelFit<'a>,
+        found: &AugmentedModel<'a>,
+        autocorrelation: Autocorrelation,
+    ) -> Option<Self> {
+        let has_effects = !found.candidates.is_empty();
+        let beside =
+            has_effects.then(|| base.thinned_beside(&found.fit, &mut terms(&found.candidates))?.ok()).flatten();
+        let each = [thinned(datasets, base.clone()), beside];
+        let is_nearer = |beside: &ModelFit<'_>, alone: &ModelFit<'_>| beside.spacing_s() < alone.spacing_s();
+        let base = match each {
+            [Some(alone), Some(beside)] if Rule::ThinnedBesideEffects.applies(is_nearer(&beside, &alone)) => beside,
+            [alone, beside] => alone.or(beside)?,
+        };
+        Some(Self { base, autocorrelation })
+    }
+
+    fn search(self, catalogue: &[Candidate]) -> MeanSearch<'a> {
+        let Autocorrelation { correlation, spurious, .. } = self.autocorrelation;
+        let (base, model) = search_beside_timing_noise(self.base, catalogue);
+        let (model, _) = search_ungated_if_outliers(&base, model, catalogue);
+        let model = compare_with_sparse(&base, model);
+        MeanSearch { base, model, correlated: Some(correlation), spurious }
+    }
+}
+
+/// What was found among all measurements, and what is left of their autocorrelation.
+struct AmongAll<'a> {
+    base: ModelFit<'a>,
+    model: MeanModel<'a>,
+    autocorrelation: Option<Autocorrelation>,
+}
+
+/// Residuals that were autocorrelated beside the effects found among all measurements.
+struct Autocorrelation {
+    /// Coefficient, and standard errors.
+    correlation: (f64, f64),
+    /// As in [`MeanStructure`].
+    spurious: bool,
+    /// No sparse terms explain it.
+    lasts: bool,
+}
+
+/// The search before measurements are thinned.
+fn search_among_all<'a>(base: ModelFit<'a>, catalogue: &[Candidate]) -> AmongAll<'a> {
+    let (base, model) = search_beside_timing_noise(base, catalogue);
+    let (model, open) = search_ungated_if_outliers(&base, model, catalogue);
+    // If no effect explains them, but residuals depend on something: sparse terms among all measurements.
+    let unexplained = model.has_outliers() && model.found.model.candidates.is_empty() && model.shows_dependence();
+    let terms = open.filter(|_| unexplained).and_then(|open| UncataloguedTerms::ungated_terms((&base, &open)));
+    let terms = Rule::UngatedTerms.finds(terms);
+    let model = match terms {
+        Some(unlisted) => model.with_terms(unlisted),
+        None => model,
+    };
+    let model = compare_with_sparse(&base, model);
+    explain_autocorrelation(base, model)
+}
+
+/// What lasts of the measurements' autocorrelation, as far as a part of the runs tells: it says which effects
+/// stand beside an autocorrelation that no sparse terms explain, and all measurements how large that is
+/// beside these effects. `None` where the part does not say so, or all do not agree: what is sought among all
+/// is needed then.
+fn autocorrelation_by_part(
+    datasets: &[Dataset],
+    base: &ModelFit<'_>,
+    catalogue: &[Candidate],
+) -> Option<Autocorrelation> {
+    let part = Rule::AutocorrelationByPart.finds(part_of_runs(datasets, base))?;
+    let beside_none = check(&AugmentedModel::base(base));
+    if is_white(&beside_none) {
+        return None;
+    }
+    let part = search_among_all(FitSettings::GEOMETRY_ONLY.fit(&part).ok()?, catalogue);
+    let of_part = part.autocorrelation.filter(|of| of.lasts)?;
+    let AugmentedModel { fit, candidates } = part.model.found.model;
+    let checked = if candidates.is_empty() {
+        beside_none
+    } else {
+        let fit = base.extended_from(fit.solution.model.term_values, &mut terms(&candidates)).ok()?;
+        check(&AugmentedModel { fit, candidates })
+    };
+    (!is_white(&checked)).then_some(Autocorrelation { correlation: checked.correlation, ..of_part })
+}
+
+/// A large effect in few measurements looks like outliers: what a search without a gate finds, where there
+/// are more of them than noise makes, or than beside the effects that were found, and the fit to all
+/// measurements.
+fn search_ungated_if_outliers<'a>(
+    base: &ModelFit<'a>,
+    model: MeanModel<'a>,
+    catalogue: &[Candidate],
+) -> (MeanModel<'a>, Option<ModelFit<'a>>) {
+    let outliers = |fit: &ModelFit<'_>| fit.solution.pass.outliers.len();
+    let is_sought = model.has_outliers() || outliers(base) > outliers(&model.found.model.fit);
+    let open = if is_sought { base.refit_ungated().ok() } else { None };
+    let ungated = open.as_ref().and_then(|open| search_ungated((base, open), &model.found, catalogue));
+    let ungated = Rule::UngatedSearch.finds(ungated);
+    (ungated.map_or(model, MeanModel::of_effects), open)
+}
+
+/// The effects beside a base fit. Where instants are noisy beside them, the base fit with that noise, and the
+/// effects beside it: motion that stamps do not tell resembles effects that grow with speed.
+fn search_beside_timing_noise<'a>(base: ModelFit<'a>, catalogue: &[Candidate]) -> (ModelFit<'a>, MeanModel<'a>) {
+    let found = search(&base, catalogue, SCAN_LEVEL, FitCache::default());
+    match Rule::TimingNoise.finds(noisy_base(&base, &found.model)) {
+        None => (base, MeanModel::of_effects(found)),
+        Some(noisy) => {
+            drop((base, found)); // their fits are large
+            let found = search(&noisy, catalogue, SCAN_LEVEL, FitCache::default());
+            (noisy, MeanModel::of_effects(found))
+        }
+    }
+}
+
+/// The base fit with the noise of instants that is left beside a model's effects; `None` where none is.
+fn noisy_base<'a>(base: &ModelFit<'a>, model: &AugmentedModel<'a>) -> Option<ModelFit<'a>> {
+    if !model.fit.has_timing_noise() {
+        return None;
+    }
+    let mut noisy = model.fit.clone();
+    noisy.fit_timing_noise(&mut terms(&model.candidates)).ok()?;
+    base.with_timing_noise_of(&noisy).ok()
+}
+
+/// Compares the effects with one sparse term. Where that explains more than all effects together, sparse
+/// terms come beside the effects, or replace them if that explains more.
+fn compare_with_sparse<'a>(base: &ModelFit<'a>, model: MeanModel<'a>) -> MeanModel<'a> {
+    if model.unlisted.is_some() || model.found.model.candidates.is_empty() {
+        return model;
+    }
+    let without = AugmentedModel::base(base);
+    let Some(sparse_search) = SparseSearch::beside(1.0, base, &without) else { return model };
+    let named = log_bayes_factor(&without.fit, &model.found.model);
+    let finding = sparse_search.finding(SPARSE_TERM_LEVEL);
+    let Some(likeliest) = finding.as_ref().map(|found| &found.model).or_else(|| sparse_search.likeliest()) else {
+        return model;
+    };
+    let unnamed = sparse_search.log_bayes_factor_of(likeliest);
+    // The prior of an uncatalogued cause is lower.
+    let more = unnamed + finding::uncatalogued_log_odds() - named;
+    let margin = margin_over_units(named, likeliest, &model.found.model);
+    let Some(term) = finding.filter(|_| Rule::TermInstead.applies(more > margin)) else {
+        let is_close = Rule::CompetingTerm.applies(more > -MIN_LOG_ODDS_MARGIN);
+        let competing = Some(odds_within(more, margin).min(1.0)).filter(|_| is_close);
+        return MeanModel { competing, ..model };
+    };
+    let instead = UncataloguedTerms::from(base, term);
+    let log_bayes_factor_instead = instead.log_bayes_factor(&without.fit);
+    let beside = sparse(base, &model.found.model, SPARSE_TERM_LEVEL).map(|term| UncataloguedTerms::from(base, term));
+    match beside.filter(|beside| beside.log_bayes_factor(&without.fit) >= log_bayes_factor_instead) {
+        Some(beside) => model.with_terms(beside),
+        None => MeanModel { found: model.found.without_effects(without), ..model }.with_terms(instead),
+    }
+}
+
+/// Where residuals are autocorrelated: sparse terms if they explain that. Autocorrelated measurements taken
+/// as independent make any effect too significant.
+fn explain_autocorrelation<'a>(base: ModelFit<'a>, model: MeanModel<'a>) -> AmongAll<'a> {
+    if model.unlisted.is_some() || is_white(&model.checked) {
+        return AmongAll { base, model, autocorrelation: None };
+    }
+    let correlation = model.checked.correlation;
+    let best = SparseSearch::beside(SPARSE_TERM_LEVEL, &base, &model.found.model)
+        .and_then(|search| search.best_prediction(SPARSE_TERM_LEVEL));
+    let tried = best.map(|sparse| (check(&sparse.model), sparse));
+    let spurious = tried.as_ref().is_some_and(|(_, sparse)| sparse.certain && sparse.drifts_more);
+    let spurious = Rule::SpuriousTerm.applies(spurious);
+    let explains = tried.filter(|(checked, sparse)| !sparse.drifts_more && (is_white(checked) || sparse.certain));
+    let explains = Rule::TermsExplainAutocorrelation.finds(explains);
+    let lasts = explains.is_none();
+    let model = match explains {
+        Some((_, sparse)) => model.with_terms(UncataloguedTerms::from(&base, sparse)),
+        None => model,
+    };
+    AmongAll { base, model, autocorrelation: Some(Autocorrelation { correlation, spurious, lasts }) }
+}
+
+/// Where residuals depend on something recorded: a search at a higher level of false positives, if it finds
+/// more effects.
+fn search_if_dependent<'a>(base: &ModelFit<'a>, model: MeanModel<'a>, catalogue: &[Candidate]) -> MeanModel<'a> {
+    if model.unlisted.is_some() || !model.shows_dependence() {
+        return model;
+    }
+    let found = search(base, catalogue, SCAN_LEVEL_IF_DEPENDENT, model.found.known.clone());
+    let is_more = found.model.candidates.len() > model.found.model.candidates.len();
+    if !Rule::SearchIfDependent.applies(is_more) {
+        return model;
+    }
+    // What the first search refused, or what is of low significance, is one candidate cause among others.
+    MeanModel { competing: Some(1.0), ..MeanModel::of_effects(found) }
+}
+
+/// Where residuals depend on something recorded still: sparse terms beside the effects.
+fn terms_if_dependent<'a>(base: &ModelFit<'a>, model: MeanModel<'a>) -> MeanModel<'a> {
+    if model.unlisted.is_some() || !model.shows_dependence() {
+        return model;
+    }
+    match Rule::TermsIfDependent.finds(sparse(base, &model.found.model, SPARSE_TERM_LEVEL)) {
+        Some(term) => model.with_terms(UncataloguedTerms::from(base, term)),
+        None => model,
+    }
+}
