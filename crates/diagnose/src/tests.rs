@@ -78,7 +78,7 @@ fn asked(datasets: &[Dataset]) -> String {
     line("form", &[form_error_statistic(&model), form_error_statistic(&of_latency)]);
     line("tests", &tests_of(&model, &[vec![0.0], vec![0.01]]));
     line("over runs", &[0.9, 0.05, 1e-6].map(|level| [0, 1].map(|of| cluster_robust_test(&model, of, level))));
-    let inflation = FitCache::default().inflation_of(&of_latency, &model.candidates[0]);
+    let inflation = FitCache::of(&base).inflation_of(&of_latency, &model.candidates[0]);
     line("deflated", &p_value_over(&model, 0, inflation));
     line("wheels", &[keeps_wheels(&base, &model.fit), keeps_wheels(&model.fit, &base)]);
     line("deviations", &remaining_deviations(&base, &model));
@@ -100,7 +100,7 @@ fn asked(datasets: &[Dataset]) -> String {
     for scored in scan(&of_latency.fit, &of_latency.candidates, &others) {
         line("scan", &scored);
     }
-    line("detectability", &detectability(&of_latency, &others, &mut FitCache::default()));
+    line("detectability", &detectability(&of_latency, &others, &mut FitCache::of(&base)));
     text
 }
 
@@ -139,7 +139,7 @@ fn regress_no_number_of_coarse_encoders_moves() {
     let parts = [effect("slip_speed"), effect("castor_drag")];
     let inflation = null.inflation(&[&parts[..1], &parts[..]]);
     // No test is made stricter than by formula, and a part for itself is inflated as among others.
-    let mut known = FitCache::default();
+    let mut known = FitCache::of(&base);
     assert!(inflation.iter().all(|of| *of >= 1.0) && known.inflation_of(&alone, &parts[0]) == inflation[0]);
     // One that is known already, and one that is not, in their order.
     let castor = known.inflation_of_each(&alone, &[parts[1].clone(), parts[0].clone()]);
@@ -190,10 +190,10 @@ fn regress_no_number_of_an_ungated_search_moves() {
     let open = base.refit_ungated().expect("all poses are taken");
     let catalogue: Vec<Candidate> = ["backlash", "truth_latency", "slip_speed"].map(effect).to_vec();
     // Nothing was found among the measurements that the gate leaves.
-    let found = search(&base, &[], SCAN_LEVEL, FitCache::default());
-    let bold = search(&open, &catalogue, SCAN_LEVEL, FitCache::default());
+    let found = search(FitCache::of(&base), &[], SCAN_LEVEL);
+    let bold = search(FitCache::of(&open), &catalogue, SCAN_LEVEL);
     let bold = (bold.model.candidates, bold.tests, bold.refusals);
-    let ungated = search_ungated((&base, &open), &found, &catalogue);
+    let ungated = search_ungated(&open, &found, &catalogue);
     let all = ungated.map(|of| (of.model.candidates, of.tests, of.refusals));
     let alone = AugmentedModel::base(&base);
     let term = SparseSearch::beside(1.0, &base, &alone);

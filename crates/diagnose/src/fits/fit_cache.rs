@@ -12,8 +12,9 @@ use crate::fits::reliability::unresolved;
 use crate::fits::scan::{Scored, scan};
 
 /// Scans of the catalogue's other effects beside models, and fits of models, on one base.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(crate) struct FitCache<'a> {
+    base: ModelFit<'a>,
     scans: Vec<(Vec<Candidate>, Vec<Scored>)>,
     fits: Vec<Arc<AugmentedModel<'a>>>,
     /// Of candidates beside models: the model's candidates, the candidate, and by how much coarse encoders
@@ -24,6 +25,16 @@ pub(crate) struct FitCache<'a> {
 }
 
 impl<'a> FitCache<'a> {
+    /// Nothing so far.
+    pub(crate) fn of(base: &ModelFit<'a>) -> Self {
+        Self { base: base.clone(), scans: Vec::new(), fits: Vec::new(), inflations: Vec::new(), unresolved: None }
+    }
+
+    /// The fit without effects.
+    pub(crate) const fn base(&self) -> &ModelFit<'a> {
+        &self.base
+    }
+
     /// The scan beside a model: one made before, or a new one.
     pub(crate) fn beside(&mut self, model: &AugmentedModel<'_>, catalogue: &[Candidate]) -> &[Scored] {
         let known = self.scans.iter().position(|(candidates, _)| *candidates == model.candidates);
@@ -51,13 +62,8 @@ impl<'a> FitCache<'a> {
     }
 
     /// A model without one of its candidates; the base where it has no other.
-    pub(crate) fn without(
-        &mut self,
-        base: &ModelFit<'a>,
-        model: &AugmentedModel<'a>,
-        index: usize,
-    ) -> Option<AugmentedModel<'a>> {
-        let fewer = self.fit(&others(model, index)).cloned().or_else(|| without(base, model, index))?;
+    pub(crate) fn without(&mut self, model: &AugmentedModel<'a>, index: usize) -> Option<AugmentedModel<'a>> {
+        let fewer = self.fit(&others(model, index)).cloned().or_else(|| without(&self.base, model, index))?;
         self.keep(&fewer);
         Some(fewer)
     }
@@ -65,11 +71,10 @@ impl<'a> FitCache<'a> {
     /// The model with other candidates, as [`refit`] makes it: one made before, or a new one, which is kept.
     pub(crate) fn refitted(
         &mut self,
-        base: &ModelFit<'a>,
         from: &AugmentedModel<'a>,
         candidates: Vec<Candidate>,
     ) -> Option<AugmentedModel<'a>> {
-        let fit = self.fit(&candidates).cloned().or_else(|| refit(base, from, candidates))?;
+        let fit = self.fit(&candidates).cloned().or_else(|| refit(&self.base, from, candidates))?;
         self.keep(&fit);
         Some(fit)
     }

@@ -8,8 +8,6 @@
 //! likelihood ratio −n ln(1 − R²).
 //! Reference: Buse 1982 (score, likelihood ratio and Wald statistics in one regression).
 
-use estimation::ModelFit;
-
 use crate::fits::augmented_model::{AugmentedModel, cost, count};
 use crate::fits::fit_cache::FitCache;
 use crate::fits::statistics::{p_of_ratio, sidak};
@@ -20,7 +18,7 @@ use crate::settings::search::{MAX_REFITTED_BY_SCORE, REFITTED_LEVEL};
 /// Of the entries whose score is not significant by itself, the one that is most significant once refitted,
 /// if it is at a family-wise level over so many tests.
 pub(crate) fn significant_once_refitted<'e, 'a>(
-    (base, known): (&ModelFit<'a>, &mut FitCache<'a>),
+    known: &mut FitCache<'a>,
     model: &AugmentedModel<'a>,
     entries: &'e [Entry],
     (tests, level): (f64, f64),
@@ -31,8 +29,8 @@ pub(crate) fn significant_once_refitted<'e, 'a>(
     let p_value_of = |entry: &'e Entry| {
         let mut candidates = model.candidates.clone();
         candidates.push(entry.scored.candidate.clone());
-        let refitted = known.refitted(base, model, candidates)?;
-        let p_value = p_value((model, &mut *known), &refitted, entry, level / tests)?;
+        let refitted = known.refitted(model, candidates)?;
+        let p_value = p_value(known, model, &refitted, entry, level / tests)?;
         Some((entry, sidak(p_value, entry.variants.max(1))))
     };
     let tested = ranked.into_iter().filter_map(p_value_of);
@@ -43,7 +41,8 @@ pub(crate) fn significant_once_refitted<'e, 'a>(
 /// The p-value of an entry's refit beside the model without it. Coarse encoders are asked where it is
 /// significant without them.
 fn p_value(
-    (model, known): (&AugmentedModel<'_>, &mut FitCache<'_>),
+    known: &mut FitCache<'_>,
+    model: &AugmentedModel<'_>,
     refitted: &AugmentedModel<'_>,
     entry: &Entry,
     level: f64,
@@ -76,20 +75,20 @@ mod tests {
         let days = [day];
         let base = fitted(&days);
         let model = AugmentedModel::base(&base);
-        let mut known = FitCache::default();
+        let mut known = FitCache::of(&base);
         let entries = best_variants(&scan(&base, &[], &[effect("slip_speed"), effect("thermal_drift")]));
         let (score, tests) = (entries[0].p_value, tests_in(&entries));
         // A level that the score misses by a factor of a hundred.
         let level = 0.01 * score * tests;
-        let found = significant_once_refitted((&base, &mut known), &model, &entries, (tests, level));
+        let found = significant_once_refitted(&mut known, &model, &entries, (tests, level));
         assert_eq!(found.map(|entry| entry.scored.candidate.id()), Some("slip_speed"));
         assert!(known.fit(&[effect("slip_speed")]).is_some(), "rivals take the refit from here");
         // Nothing is significant at any level: rejects a level that is not asked.
-        let none = significant_once_refitted((&base, &mut known), &model, &entries, (tests, 1e-30));
+        let none = significant_once_refitted(&mut known, &model, &entries, (tests, 1e-30));
         assert!(none.is_none());
         // Nor are entries refitted whose score says nothing at all.
         let mut dull = entries.clone();
         dull.iter_mut().for_each(|entry| entry.p_value = 0.02);
-        assert!(significant_once_refitted((&base, &mut known), &model, &dull, (tests, 1.0)).is_none());
+        assert!(significant_once_refitted(&mut known, &model, &dull, (tests, 1.0)).is_none());
     }
 }

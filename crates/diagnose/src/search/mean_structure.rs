@@ -100,7 +100,7 @@ pub(crate) fn mean_structure<'a>(
         }
         None => search_and_thin(datasets, base, catalogue),
     };
-    let model = search_if_dependent(&base, model, catalogue);
+    let model = search_if_dependent(model, catalogue);
     let model = terms_if_dependent(&base, model);
     let MeanModel { found, unlisted, checked, competing } = model;
     MeanStructure { base, found, checked, unlisted, correlated, spurious, competing }
@@ -247,7 +247,7 @@ fn search_ungated_if_outliers<'a>(
     let outliers = |fit: &ModelFit<'_>| fit.solution.pass.outliers.len();
     let is_sought = model.has_outliers() || outliers(base) > outliers(&model.found.model.fit);
     let open = if is_sought { base.refit_ungated().ok() } else { None };
-    let ungated = open.as_ref().and_then(|open| search_ungated((base, open), &model.found, catalogue));
+    let ungated = open.as_ref().and_then(|open| search_ungated(open, &model.found, catalogue));
     let ungated = Rule::UngatedSearch.finds(ungated);
     (ungated.map_or(model, MeanModel::of_effects), open)
 }
@@ -255,12 +255,12 @@ fn search_ungated_if_outliers<'a>(
 /// The effects beside a base fit. Where instants are noisy beside them, the base fit with that noise, and the
 /// effects beside it: motion that stamps do not tell resembles effects that grow with speed.
 fn search_beside_timing_noise<'a>(base: ModelFit<'a>, catalogue: &[Candidate]) -> (ModelFit<'a>, MeanModel<'a>) {
-    let found = search(&base, catalogue, SCAN_LEVEL, FitCache::default());
+    let found = search(FitCache::of(&base), catalogue, SCAN_LEVEL);
     match Rule::TimingNoise.finds(noisy_base(&base, &found.model)) {
         None => (base, MeanModel::of_effects(found)),
         Some(noisy) => {
             drop((base, found)); // their fits are large
-            let found = search(&noisy, catalogue, SCAN_LEVEL, FitCache::default());
+            let found = search(FitCache::of(&noisy), catalogue, SCAN_LEVEL);
             (noisy, MeanModel::of_effects(found))
         }
     }
@@ -331,11 +331,11 @@ fn explain_autocorrelation<'a>(base: ModelFit<'a>, model: MeanModel<'a>) -> Amon
 
 /// Where residuals depend on something recorded: a search at a higher level of false positives, if it finds
 /// more effects.
-fn search_if_dependent<'a>(base: &ModelFit<'a>, model: MeanModel<'a>, catalogue: &[Candidate]) -> MeanModel<'a> {
+fn search_if_dependent<'a>(model: MeanModel<'a>, catalogue: &[Candidate]) -> MeanModel<'a> {
     if model.unlisted.is_some() || !model.shows_dependence() {
         return model;
     }
-    let found = search(base, catalogue, SCAN_LEVEL_IF_DEPENDENT, model.found.known.clone());
+    let found = search(model.found.known.clone(), catalogue, SCAN_LEVEL_IF_DEPENDENT);
     let is_more = found.model.candidates.len() > model.found.model.candidates.len();
     if !Rule::SearchIfDependent.applies(is_more) {
         return model;

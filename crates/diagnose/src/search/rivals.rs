@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use estimation::ModelFit;
 use nalgebra::DVector;
 use rules::Rule;
 use serde::Serialize;
@@ -74,7 +73,7 @@ pub(crate) struct Name {
 /// The rivals of one candidate in a model whose others stay, each refitted: the best variant of each effect
 /// that explains enough, most probable first.
 pub(crate) fn rivals<'a>(
-    (base, known): (&ModelFit<'a>, &mut FitCache<'a>),
+    known: &mut FitCache<'a>,
     without: &AugmentedModel<'a>,
     index: usize,
     entries: &[Entry],
@@ -89,7 +88,7 @@ pub(crate) fn rivals<'a>(
         let with = |candidate: &Candidate| {
             let mut candidates = without.candidates.clone();
             candidates.insert(index, candidate.clone());
-            known.fit(&candidates).cloned().or_else(|| refit(base, without, candidates))
+            known.fit(&candidates).cloned().or_else(|| refit(known.base(), without, candidates))
         };
         let models = refit_each(added, with);
         models.iter().for_each(|model| known.keep(model));

@@ -50,7 +50,7 @@ impl<'a> SearchResult<'a> {
 
 /// The model with one effect more: the best of a scan, refitted, if that confirms it, else the next.
 fn grown<'a>(
-    (base, known): (&ModelFit<'a>, &mut FitCache<'a>),
+    known: &mut FitCache<'a>,
     model: &AugmentedModel<'a>,
     mut entries: Vec<Entry>,
     level: f64,
@@ -59,17 +59,12 @@ fn grown<'a>(
     let (tests, index) = (tests_in(&entries), model.candidates.len());
     for _ in 0..MAX_CANDIDATES_TRIED {
         let best = most_significant(&entries, tests, level).or_else(|| {
-            Rule::SignificantOnceRefitted.finds(significant_once_refitted(
-                (base, &mut *known),
-                model,
-                &entries,
-                (tests, level),
-            ))
+            Rule::SignificantOnceRefitted.finds(significant_once_refitted(known, model, &entries, (tests, level)))
         })?;
         let (id, statistic) = (best.scored.candidate.id(), best.scored.statistic);
-        let found = rivals((base, &mut *known), model, index, &entries, statistic, refusals);
+        let found = rivals(known, model, index, &entries, statistic, refusals);
         let refuted = match found.into_iter().next().filter(|(name, _)| name.log_odds > 0.0) {
-            Some((name, extended)) => match confirm((model, &mut *known), &extended, index, tests, level) {
+            Some((name, extended)) => match confirm(known, model, &extended, index, tests, level) {
                 Ok(()) => return Some(extended),
                 Err(refusal) => {
                     refusals.insert(name.candidate.id(), refusal);
@@ -91,7 +86,7 @@ fn grown<'a>(
 /// explain as much can be, by how much the best of the others does: what was taken in spite of the first
 /// stays for that reason. Its cause is outdone then.
 fn possible_rivals<'a>(
-    (base, known): (&ModelFit<'a>, &mut FitCache<'a>),
+    known: &mut FitCache<'a>,
     without: &AugmentedModel<'a>,
     index: usize,
     entries: &[Entry],
@@ -100,7 +95,7 @@ fn possible_rivals<'a>(
     let mut open = entries.to_vec();
     loop {
         let best = open.iter().map(|entry| entry.scored.statistic).fold(0.0, f64::max);
-        let mut found = rivals((base, &mut *known), without, index, &open, best, refusals);
+        let mut found = rivals(known, without, index, &open, best, refusals);
         let left = open.len();
         if !found.is_empty() {
             found[0].0.outdone |= left < entries.len();
@@ -119,7 +114,7 @@ fn possible_rivals<'a>(
 /// that do not cancel each other, the smallest that the log Bayes factor does not discriminate from the best,
 /// by more than what may be the error of its own effects' form.
 fn without_what_cancels<'a>(
-    (base, known): (&ModelFit<'a>, &mut FitCache<'a>),
+    known: &mut FitCache<'a>,
     model: AugmentedModel<'a>,
     refusals: &mut Refusals,
 ) -> AugmentedModel<'a> {
@@ -132,7 +127,7 @@ fn without_what_cancels<'a>(
             let is_chosen = |(index, _): &(usize, &Candidate)| chosen >> index & 1 == 1;
             let candidates: Vec<Candidate> =
                 model.candidates.iter().enumerate().filter(is_chosen).map(|(_, candidate)| candidate.clone()).collect();
-            known.refitted(base, &model, candidates)
+            known.refitted(&model, candidates)
         })
         .collect();
     let all: Vec<&'static str> = model.candidates.iter().map(Candidate::id).collect();
@@ -142,7 +137,7 @@ fn without_what_cancels<'a>(
     if !all_cancel || subsets.is_empty() {
         subsets.push(model);
     }
-    let odds: Vec<f64> = subsets.iter().map(|subset| log_bayes_factor(base, subset)).collect();
+    let odds: Vec<f64> = subsets.iter().map(|subset| log_bayes_factor(known.base(), subset)).collect();
     let best = odds.iter().copied().fold(f64::MIN, f64::max);
     // What more effects explain may be the error of form of those in the subset, and of no others.
     let is_close = |subset: usize| odds[subset] >= best - log_odds_margin_of(&subsets[subset]);
@@ -168,7 +163,8 @@ fn without_what_cancels<'a>(
 
 /// Whether a refit confirms what a score says of a candidate, or why not.
 fn confirm(
-    (without, known): (&AugmentedModel<'_>, &mut FitCache<'_>),
+    known: &mut FitCache<'_>,
+    without: &AugmentedModel<'_>,
     extended: &AugmentedModel<'_>,
     index: usize,
     tests: f64,
@@ -231,14 +227,9 @@ fn scale_differences_of_delays(causes: &mut [(Name, AugmentedModel<'_>)]) {
 }
 
 /// Adds effects while the scan finds some. Then tests whether each is needed beside the others, and finds
-/// its possible causes. `known` is the cache of the same base.
-pub(crate) fn search<'a>(
-    base: &ModelFit<'a>,
-    catalogue: &[Candidate],
-    level: f64,
-    mut known: FitCache<'a>,
-) -> SearchResult<'a> {
-    let mut model = AugmentedModel::base(base);
+/// its possible causes.
+pub(crate) fn search<'a>(mut known: FitCache<'a>, catalogue: &[Candidate], level: f64) -> SearchResult<'a> {
+    let mut model = AugmentedModel::base(known.base());
     let mut refusals = Refusals::new();
     let mut first_scan = Vec::new();
     let mut names: Vec<Vec<Name>> = Vec::new();
@@ -251,15 +242,15 @@ pub(crate) fn search<'a>(
         // What is no more than the error of a larger effect's form is none beside it.
         let form_error = form_error_statistic(&model);
         entries.retain(|entry| entry.scored.statistic >= form_error || !Rule::FormErrorInScan.applies(true));
-        let Some(extended) = grown((base, &mut known), &model, entries, level, &mut refusals) else { break };
+        let Some(extended) = grown(&mut known, &model, entries, level, &mut refusals) else { break };
         model = extended;
     }
-    model = without_what_cancels((base, &mut known), model, &mut refusals);
+    model = without_what_cancels(&mut known, model, &mut refusals);
     let mut index = 0;
     while index < model.candidates.len() {
-        let Some(without) = known.without(base, &model, index) else { break };
+        let Some(without) = known.without(&model, index) else { break };
         let entries = best_variants(known.beside(&without, catalogue));
-        let mut found = possible_rivals((base, &mut known), &without, index, &entries, &mut refusals);
+        let mut found = possible_rivals(&mut known, &without, index, &entries, &mut refusals);
         if found.first().is_none_or(|(name, _)| name.log_odds <= 0.0) {
             // Another candidate explains it, or beside the others no physical one does.
             model = without;
@@ -303,7 +294,7 @@ pub(crate) fn search<'a>(
     }
     let candidates = model.candidates.clone();
     let mut extra_sigma: Vec<Vec<f64>> =
-        (0..candidates.len()).map(|index| fit_variant(base, &mut model, index)).collect();
+        (0..candidates.len()).map(|index| fit_variant(known.base(), &mut model, index)).collect();
     for (candidate, variances) in beside {
         if let Some(index) = candidates.iter().position(|own| *own == candidate) {
             extra_sigma[index]
@@ -319,7 +310,7 @@ pub(crate) fn search<'a>(
         if !Rule::InsignificantAtTheEnd.applies(!is_significant) {
             continue;
         }
-        if let Some(without) = known.without(base, &model, index) {
+        if let Some(without) = known.without(&model, index) {
             model = without;
             names.remove(index);
             extra_sigma.remove(index);
@@ -331,11 +322,12 @@ pub(crate) fn search<'a>(
 /// What an ungated search finds. A large effect that shows in few measurements makes them outliers, and
 /// among the others it is not detected.
 pub(crate) fn search_ungated<'a>(
-    (base, open): (&ModelFit<'a>, &ModelFit<'a>),
+    open: &ModelFit<'a>,
     found: &SearchResult<'a>,
     catalogue: &[Candidate],
 ) -> Option<SearchResult<'a>> {
-    let bold = search(open, catalogue, SCAN_LEVEL, FitCache::default());
+    let base = found.known.base();
+    let bold = search(FitCache::of(open), catalogue, SCAN_LEVEL);
     if bold.model.candidates.is_empty() {
         return None;
     }

@@ -17,7 +17,7 @@ use crate::small_robot::{fitted, session};
 /// A structure without effects, whose checks have these p-values.
 fn structure<'a>(datasets: &'a [Dataset], checks: &[(Check, f64, bool)]) -> MeanStructure<'a> {
     let base = fitted(datasets);
-    let found = search(&base, &[], 0.01, FitCache::default());
+    let found = search(FitCache::of(&base), &[], 0.01);
     let of = |(check, p_value, passes): &(Check, f64, bool)| TestResult {
         check: check.clone(),
         statistic: 9.0,
