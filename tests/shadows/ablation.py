@@ -68,11 +68,16 @@ def main():
     parser.add_argument("--replay", required=True)
     parser.add_argument("--rules", nargs="*")
     parser.add_argument("--most", type=int, default=150, help="logs of a rule at the most")
+    parser.add_argument("--every", type=int, default=1, help="take every so many-th log of a folder")
     parser.add_argument("--work", type=Path, default=Path("target/ablation"))
     arguments = parser.parse_args()
     digest = hashlib.sha256(Path(arguments.yair).read_bytes()).hexdigest()[:12]
     work = (arguments.work / digest).resolve()
-    logs = sorted(file.parent for folder in arguments.logs for file in folder.glob("*/answer.json"))
+    logs = [
+        log
+        for folder in arguments.logs
+        for log in sorted(file.parent for file in folder.glob("*/answer.json"))[:: arguments.every]
+    ]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         counts = list(pool.map(lambda log: decisions(arguments.yair, log, work), logs))
     deciding = {}
@@ -82,8 +87,11 @@ def main():
     print(f"{len(logs)} logs")
     for rule, its_logs in sorted(deciding.items(), key=lambda item: len(item[1])):
         print(f"{rule}: decides in {len(its_logs)} ({100 * len(its_logs) / len(logs):.1f} %)", flush=True)
-        if arguments.rules is not None and rule not in arguments.rules:
+    for rule in sorted(deciding, key=lambda rule: len(deciding[rule])) if arguments.rules is None else arguments.rules:
+        its_logs = deciding.get(rule, [])
+        if not its_logs:
             continue
+        print(f"without {rule}, {min(arguments.most, len(its_logs))} of its {len(its_logs)} logs:")
         chosen = random.Random(SEED).sample(its_logs, min(arguments.most, len(its_logs)))
         table = without_rule(arguments, rule, chosen, work)
         if table is None:

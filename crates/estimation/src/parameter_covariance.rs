@@ -2,6 +2,7 @@
 
 use model_term::ModelTerm;
 use nalgebra::DMatrix;
+use rules::Rule;
 
 use crate::model::Column;
 use crate::model_fit::ModelFit;
@@ -55,7 +56,8 @@ impl ModelFit<'_> {
     pub(crate) fn covariance_by_systematic_errors(&self) -> Option<DMatrix<f64>> {
         let free = self.free_basis();
         let (_, inverse) = self.solution.information(&self.columns)?.along(&free).solve()?;
-        let errors = self.systematic_errors(&free, &mut []).filter(|_| !inverse.is_empty())?;
+        let errors = self.systematic_errors(&free, &mut []).filter(|_| !inverse.is_empty());
+        let errors = Rule::SystematicCovariance.finds(errors)?;
         Some(&free * errors.added_covariance(OwnScatter::NotCounted, &inverse) * free.transpose())
     }
 

@@ -10,6 +10,7 @@ use std::cell::LazyCell;
 use dataset::{CovarianceScale, MapDistortion, Run, RunView, Session, TruthSample};
 use kinematics::Pose;
 use rayon::prelude::*;
+use rules::Rule;
 
 use crate::model::{Column, Model};
 use crate::noise::NoisePrior;
@@ -89,8 +90,13 @@ impl<'a> Records<'a> {
                 add_poses(&mut segments, base, track, run.run(), measured_poses(run, reference, late_s));
                 for poses in &mut segments {
                     let Some(nominal) = start else { continue };
+                    if !Rule::PosesBetweenRows.is_on() {
+                        continue;
+                    }
+                    let all = poses.measurements.len();
                     take_one_for_each_row(poses, &run.odometry().t_s, nominal, reference);
                     take_those_near_rows(poses, nominal, reference);
+                    let _ = Rule::PosesBetweenRows.applies(poses.measurements.len() < all);
                 }
                 add_displacements(&mut segments, base, track, run.run(), late_s);
                 segments

@@ -8,6 +8,7 @@
 //! pass gives the gradients, and I⁻¹ (Σ g gᵀ) I⁻¹ is the covariance that all of them make.
 
 use nalgebra::{DMatrix, DVector};
+use rules::Rule;
 
 use crate::map_functions::{MapFunction, map_functions};
 use crate::normal_equations::{ClusterRobust, Information};
@@ -136,7 +137,8 @@ fn errors(records: &Records<'_>) -> Vec<SystematicError> {
             errors.extend(functions.iter().filter(|_| sigma > 0.0).map(of));
         }
     }
-    errors.extend(shared_rates(&records.segments).into_iter().map(SystematicError::OfRate));
+    let shared = Rule::SharedRates.finds(Some(shared_rates(&records.segments)).filter(|rates| !rates.is_empty()));
+    errors.extend(shared.into_iter().flatten().map(SystematicError::OfRate));
     errors
 }
 

@@ -105,6 +105,8 @@ rules! {
     RefitConfirms,
     /// Search: statistics are deflated by what coarse encoders inflate.
     Inflation,
+    /// Tests: where the rounding of counts decides, tests are judged among simulated runs.
+    JudgedAmongSimulated,
     /// Search: an effect must be significant over the runs.
     OverRuns,
     /// Search: where turns scatter, an effect must be as significant over the runs as in all.
@@ -157,6 +159,8 @@ rules! {
     DependentResiduals,
     /// Noise effects: jumps by heavy tails and outliers.
     LargeErrors,
+    /// Noise effects: the likelihood of large errors says whose they are.
+    Attribution,
     /// Noise effects: what errors do at rest says whether they are the instrument's.
     ErrorsAtRest,
     /// Noise effects: turns that scatter.
@@ -181,6 +185,12 @@ rules! {
     SensorPosition,
     /// Fit: measurements are thinned until their innovations are white.
     Thinning,
+    /// Fit: of poses between rows, one a row, and those near their rows, are taken.
+    PosesBetweenRows,
+    /// Covariance: recorded rates that are alike share the error of their rounding.
+    SharedRates,
+    /// Covariance: what a map's distortion and shared rates add.
+    SystematicCovariance,
     /// Filter: a measurement beyond the gate is left out.
     OutlierGate,
     /// Filter: after outliers in a row the pose is begun anew.

@@ -122,7 +122,7 @@ pub(crate) fn scatter(structure: &MeanStructure<'_>, recorded: &[Dataset], witho
             };
             // Tails have many causes.
             let or_unlisted = persistence == ResidualPersistence::Undecided;
-            let likelihoods = log_likelihoods(structure.model(), &ids, any);
+            let likelihoods = Rule::Attribution.finds(log_likelihoods(structure.model(), &ids, any));
             let (likelihoods, any) = likelihoods.unwrap_or_else(|| (vec![0.0; ids.len()], f64::NEG_INFINITY));
             let likely: Vec<_> = ids.into_iter().zip(likelihoods).collect();
             let basis = Basis::LargeErrors(persistence);
@@ -132,7 +132,7 @@ pub(crate) fn scatter(structure: &MeanStructure<'_>, recorded: &[Dataset], witho
     if let Some((coefficient, sigmas, at_rest)) = autocorrelated {
         let mut causes = with_sign(Sign::AutocorrelatedErrors, without_ids);
         // Where something else is found too, it may be that this is the rest of it.
-        let may_be_rest = structure.spurious || !structure.found.model.candidates.is_empty() || turns.is_some();
+        let may_be_rest = !structure.found.model.candidates.is_empty() || turns.is_some();
         if at_rest == ErrorsAtRest::White {
             causes.insert(0, Cause::Unknown);
         } else if !causes.is_empty() && (may_be_rest || at_rest == ErrorsAtRest::WhiteOrSlow) {

@@ -81,22 +81,6 @@ pub(crate) fn occam_factor(directions: &[(f64, f64)]) -> f64 {
     log_occam_factor(&directions.iter().map(|(value, size)| (*value, size * size * value)).collect::<Vec<_>>())
 }
 
-/// A model that was fitted ungated, refitted with the outlier gate on. `None` unless it rejects fewer
-/// measurements than the model found before, and its log Bayes factor, less that of its trials, exceeds the
-/// other's by the margin.
-pub(crate) fn regated<'a>(
-    open: AugmentedModel<'a>,
-    base: &ModelFit<'a>,
-    found: &AugmentedModel<'a>,
-    log_trials: f64,
-) -> Option<AugmentedModel<'a>> {
-    let fit = open.fit.refit_gated(&mut terms(&open.candidates)).ok()?;
-    let model = AugmentedModel { fit, ..open };
-    let outliers = |model: &AugmentedModel<'_>| model.fit.solution.pass.outliers.len();
-    let (before, after) = (log_bayes_factor(base, found), log_bayes_factor(base, &model) - log_trials);
-    (outliers(&model) < outliers(found) && after > before + log_odds_margin(before)).then_some(model)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

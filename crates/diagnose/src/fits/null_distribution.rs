@@ -7,6 +7,7 @@
 
 use estimation::{ModelFit, Projected, total};
 use rayon::prelude::*;
+use rules::Rule;
 
 use crate::candidates::candidate::{Candidate, terms};
 use crate::fits::augmented_model::AugmentedModel;
@@ -22,7 +23,7 @@ pub(crate) struct NullDistribution<'m, 'a> {
 impl<'m, 'a> NullDistribution<'m, 'a> {
     /// Of a model; `None` where formulas hold.
     pub(crate) fn of(model: &'m AugmentedModel<'a>) -> Option<Self> {
-        model.fit.depends_on_rounding().then_some(Self { model })
+        Rule::JudgedAmongSimulated.finds(model.fit.depends_on_rounding().then_some(Self { model }))
     }
 
     /// What simulated runs give, one after the other.

@@ -1,16 +1,15 @@
 //! The mean model: which effects and sparse terms a base fit needs.
 //!
-//! Stages, each a function of the results before it: search, ungated search, ungated sparse terms,
-//! comparison with one sparse term, thinning of autocorrelated measurements, search at a higher level,
-//! sparse terms beside the effects. Once sparse terms are found, the stages after that leave the model as
-//! it is.
+//! Stages, each a function of the results before it: search, comparison with one sparse term, thinning of
+//! autocorrelated measurements, search at a higher level, sparse terms with the effects. Once sparse terms
+//! are found, the stages after that leave the model as it is.
 
 use dataset::Dataset;
 use estimation::{FitSettings, ModelFit};
 use rules::Rule;
 
 use crate::candidates::candidate::{Candidate, terms};
-use crate::checks::check::{Check, TestResult};
+use crate::checks::check::TestResult;
 use crate::checks::residual_tests::{Checked, check};
 use crate::findings::finding;
 use crate::fits::augmented_model::AugmentedModel;
@@ -18,7 +17,7 @@ use crate::fits::fit_cache::FitCache;
 use crate::fits::model_comparison::{log_bayes_factor, margin_over_units, odds_within};
 use crate::records::part_of_runs::part_of_runs;
 use crate::records::record_faults::sessions;
-use crate::search::selection::{SearchResult, search, search_ungated};
+use crate::search::selection::{SearchResult, search};
 use crate::search::sparse_terms::{SparseSearch, UncataloguedTerms, sparse};
 use crate::settings::levels::{MIN_LOG_ODDS_MARGIN, SCAN_LEVEL, SPARSE_TERM_LEVEL};
 use crate::settings::search::{AUTOCORRELATION_SIGMAS, MIN_AUTOCORRELATION, SCAN_LEVEL_IF_DEPENDENT};
@@ -39,9 +38,6 @@ pub(crate) struct MeanStructure<'a> {
     pub(crate) unlisted: Option<UncataloguedTerms<'a>>,
     /// Correlation of successive measurements, where they were thinned: coefficient, and standard errors.
     pub(crate) correlated: Option<(f64, f64)>,
-    /// A sparse term made measurements certainly likelier though odometry drifts more with it: another
-    /// cause is present.
-    pub(crate) spurious: bool,
     /// Posterior odds of one uncatalogued term against all named effects; `None` if none is named or it
     /// replaced them.
     pub(crate) competing: Option<f64>,
@@ -72,11 +68,6 @@ impl<'a> MeanModel<'a> {
         Self { checked: check(&unlisted.model), unlisted: Some(unlisted), ..self }
     }
 
-    /// Whether more measurements are outliers than the noise model predicts.
-    fn has_outliers(&self) -> bool {
-        self.checked.checks.iter().any(|test| test.check == Check::Outliers && !test.passes)
-    }
-
     /// Whether residuals depend on a recorded quantity.
     fn shows_dependence(&self) -> bool {
         self.checked.checks.iter().any(TestResult::shows_dependence)
@@ -89,51 +80,64 @@ pub(crate) fn mean_structure<'a>(
     base: ModelFit<'a>,
     catalogue: &[Candidate],
 ) -> MeanStructure<'a> {
-    let by_part = autocorrelation_by_part(datasets, &base, catalogue);
-    let MeanSearch { base, model, correlated, spurious } = match by_part {
-        Some(autocorrelation) => {
+    let Searched { base, model, correlated } = match correlation_by_part(datasets, &base, catalogue) {
+        Some(correlation) => {
             let whole = base.clone().without_innovations(); // most of its memory
-            match Thinned::of(datasets, base, autocorrelation) {
-                Some(thinned) => thinned.search(catalogue),
+            match thinned(datasets, base) {
+                Some(thinned) => search_thinned(thinned, correlation, catalogue),
                 None => search_and_thin(datasets, whole.with_innovations(&mut []).into_owned(), catalogue),
             }
         }
         None => search_and_thin(datasets, base, catalogue),
     };
-    let model = search_if_dependent(model, catalogue);
-    let model = terms_if_dependent(&base, model);
+    let model = terms_if_dependent(&base, search_if_dependent(model, catalogue));
     let MeanModel { found, unlisted, checked, competing } = model;
-    MeanStructure { base, found, checked, unlisted, correlated, spurious, competing }
+    MeanStructure { base, found, checked, unlisted, correlated, competing }
 }
 
-/// A base fit and the model found beside it, thinned if need be; `correlated` and `spurious` as in
-/// [`MeanStructure`].
-struct MeanSearch<'a> {
+/// A base fit and the model that was found with it; `correlated` as in [`MeanStructure`].
+struct Searched<'a> {
     base: ModelFit<'a>,
     model: MeanModel<'a>,
     correlated: Option<(f64, f64)>,
-    spurious: bool,
 }
 
 /// A search among all measurements, and another one among thinned ones where the residuals stay
 /// autocorrelated.
-fn search_and_thin<'a>(datasets: &'a [Dataset], base: ModelFit<'a>, catalogue: &[Candidate]) -> MeanSearch<'a> {
-    let AmongAll { base, model, autocorrelation } = search_among_all(base, catalogue);
-    let spurious = autocorrelation.as_ref().is_some_and(|of| of.spurious);
-    let lasting = autocorrelation.filter(|of| Rule::ThinIfAutocorrelated.applies(of.lasts));
-    match lasting.and_then(|of| Thinned::beside(datasets, &base, &model.found.model, of)) {
-        Some(thinned) => {
-            drop((base, model)); // their fits are large
-            thinned.search(catalogue)
+fn search_and_thin<'a>(datasets: &'a [Dataset], base: ModelFit<'a>, catalogue: &[Candidate]) -> Searched<'a> {
+    let among_all = search_among_all(base, catalogue);
+    let lasting = among_all.lasting_correlation().filter(|_| Rule::ThinIfAutocorrelated.applies(true));
+    let thinned = lasting.and_then(|lasting| {
+        Some((thinned_beside(datasets, &among_all.base, &among_all.model.found.model)?, lasting))
+    });
+    match thinned {
+        Some((thinned, correlation)) => {
+            drop(among_all); // its fits are large
+            search_thinned(thinned, correlation, catalogue)
         }
-        None => MeanSearch { base, model, correlated: None, spurious },
+        None => among_all,
     }
 }
 
-/// A base fit of thinned measurements, and why they are thinned.
-struct Thinned<'a> {
-    base: ModelFit<'a>,
-    autocorrelation: Autocorrelation,
+impl Searched<'_> {
+    /// The autocorrelation that is left with what was found: coefficient, and standard errors.
+    /// Autocorrelated measurements taken as independent make any effect too significant.
+    fn lasting_correlation(&self) -> Option<(f64, f64)> {
+        let lasts = self.model.unlisted.is_none() && !is_white(&self.model.checked);
+        lasts.then_some(self.model.checked.correlation)
+    }
+}
+
+/// The search before measurements are thinned.
+fn search_among_all<'a>(base: ModelFit<'a>, catalogue: &[Candidate]) -> Searched<'a> {
+    let (base, model) = search_beside_timing_noise(base, catalogue);
+    let model = compare_with_sparse(&base, model);
+    Searched { base, model, correlated: None }
+}
+
+/// The search among thinned measurements, whose autocorrelation this was before.
+fn search_thinned<'a>(thinned: ModelFit<'a>, correlation: (f64, f64), catalogue: &[Candidate]) -> Searched<'a> {
+    Searched { correlated: Some(correlation), ..search_among_all(thinned, catalogue) }
 }
 
 /// A base fit, thinned until what it leaves is white.
@@ -141,91 +145,34 @@ fn thinned<'a>(datasets: &'a [Dataset], base: ModelFit<'a>) -> Option<ModelFit<'
     base.thinned_further().unwrap_or_else(|| THINNED.fit(&sessions(datasets))).ok()
 }
 
-impl<'a> Thinned<'a> {
-    /// At the spacing at which what the base fit leaves is white.
-    fn of(datasets: &'a [Dataset], base: ModelFit<'a>, autocorrelation: Autocorrelation) -> Option<Self> {
-        Some(Self { base: thinned(datasets, base)?, autocorrelation })
+/// A base fit at the spacing at which what is left with the effects found among all measurements is white,
+/// where that is less than without them. Errors that alternate, as of displacements that share a scan, may
+/// show with the effects alone: wider than without them nothing is thinned.
+fn thinned_beside<'a>(
+    datasets: &'a [Dataset],
+    base: &ModelFit<'a>,
+    found: &AugmentedModel<'a>,
+) -> Option<ModelFit<'a>> {
+    let has_effects = !found.candidates.is_empty();
+    let beside = has_effects.then(|| base.thinned_beside(&found.fit, &mut terms(&found.candidates))?.ok()).flatten();
+    let is_nearer = |beside: &ModelFit<'_>, alone: &ModelFit<'_>| beside.spacing_s() < alone.spacing_s();
+    match (thinned(datasets, base.clone()), beside) {
+        (Some(alone), Some(beside)) if Rule::ThinnedBesideEffects.applies(is_nearer(&beside, &alone)) => Some(beside),
+        (alone, beside) => alone.or(beside),
     }
-
-    /// At the spacing at which what is left beside the effects found among all measurements is white, where
-    /// that is less. Errors that alternate, as of displacements that share a scan, may show beside the
-    /// effects alone: wider than without them nothing is thinned.
-    fn beside(
-        datasets: &'a [Dataset],
-        base: &ModelFit<'a>,
-        found: &AugmentedModel<'a>,
-        autocorrelation: Autocorrelation,
-    ) -> Option<Self> {
-        let has_effects = !found.candidates.is_empty();
-        let beside =
-            has_effects.then(|| base.thinned_beside(&found.fit, &mut terms(&found.candidates))?.ok()).flatten();
-        let each = [thinned(datasets, base.clone()), beside];
-        let is_nearer = |beside: &ModelFit<'_>, alone: &ModelFit<'_>| beside.spacing_s() < alone.spacing_s();
-        let base = match each {
-            [Some(alone), Some(beside)] if Rule::ThinnedBesideEffects.applies(is_nearer(&beside, &alone)) => beside,
-            [alone, beside] => alone.or(beside)?,
-        };
-        Some(Self { base, autocorrelation })
-    }
-
-    fn search(self, catalogue: &[Candidate]) -> MeanSearch<'a> {
-        let Autocorrelation { correlation, spurious, .. } = self.autocorrelation;
-        let (base, model) = search_beside_timing_noise(self.base, catalogue);
-        let (model, _) = search_ungated_if_outliers(&base, model, catalogue);
-        let model = compare_with_sparse(&base, model);
-        MeanSearch { base, model, correlated: Some(correlation), spurious }
-    }
-}
-
-/// What was found among all measurements, and what is left of their autocorrelation.
-struct AmongAll<'a> {
-    base: ModelFit<'a>,
-    model: MeanModel<'a>,
-    autocorrelation: Option<Autocorrelation>,
-}
-
-/// Residuals that were autocorrelated beside the effects found among all measurements.
-struct Autocorrelation {
-    /// Coefficient, and standard errors.
-    correlation: (f64, f64),
-    /// As in [`MeanStructure`].
-    spurious: bool,
-    /// No sparse terms explain it.
-    lasts: bool,
-}
-
-/// The search before measurements are thinned.
-fn search_among_all<'a>(base: ModelFit<'a>, catalogue: &[Candidate]) -> AmongAll<'a> {
-    let (base, model) = search_beside_timing_noise(base, catalogue);
-    let (model, open) = search_ungated_if_outliers(&base, model, catalogue);
-    // If no effect explains them, but residuals depend on something: sparse terms among all measurements.
-    let unexplained = model.has_outliers() && model.found.model.candidates.is_empty() && model.shows_dependence();
-    let terms = open.filter(|_| unexplained).and_then(|open| UncataloguedTerms::ungated_terms((&base, &open)));
-    let terms = Rule::UngatedTerms.finds(terms);
-    let model = match terms {
-        Some(unlisted) => model.with_terms(unlisted),
-        None => model,
-    };
-    let model = compare_with_sparse(&base, model);
-    explain_autocorrelation(base, model)
 }
 
 /// What lasts of the measurements' autocorrelation, as far as a part of the runs tells: it says which effects
-/// stand beside an autocorrelation that no sparse terms explain, and all measurements how large that is
-/// beside these effects. `None` where the part does not say so, or all do not agree: what is sought among all
-/// is needed then.
-fn autocorrelation_by_part(
-    datasets: &[Dataset],
-    base: &ModelFit<'_>,
-    catalogue: &[Candidate],
-) -> Option<Autocorrelation> {
+/// stand beside an autocorrelation, and all measurements how large that is with these effects. `None` where
+/// the part does not say so, or all do not agree: what is sought among all is needed then.
+fn correlation_by_part(datasets: &[Dataset], base: &ModelFit<'_>, catalogue: &[Candidate]) -> Option<(f64, f64)> {
     let part = Rule::AutocorrelationByPart.finds(part_of_runs(datasets, base))?;
     let beside_none = check(&AugmentedModel::base(base));
     if is_white(&beside_none) {
         return None;
     }
     let part = search_among_all(FitSettings::GEOMETRY_ONLY.fit(&part).ok()?, catalogue);
-    let of_part = part.autocorrelation.filter(|of| of.lasts)?;
+    part.lasting_correlation()?;
     let AugmentedModel { fit, candidates } = part.model.found.model;
     let checked = if candidates.is_empty() {
         beside_none
@@ -233,23 +180,7 @@ fn autocorrelation_by_part(
         let fit = base.extended_from(fit.solution.model.term_values, &mut terms(&candidates)).ok()?;
         check(&AugmentedModel { fit, candidates })
     };
-    (!is_white(&checked)).then_some(Autocorrelation { correlation: checked.correlation, ..of_part })
-}
-
-/// A large effect in few measurements looks like outliers: what a search without a gate finds, where there
-/// are more of them than noise makes, or than beside the effects that were found, and the fit to all
-/// measurements.
-fn search_ungated_if_outliers<'a>(
-    base: &ModelFit<'a>,
-    model: MeanModel<'a>,
-    catalogue: &[Candidate],
-) -> (MeanModel<'a>, Option<ModelFit<'a>>) {
-    let outliers = |fit: &ModelFit<'_>| fit.solution.pass.outliers.len();
-    let is_sought = model.has_outliers() || outliers(base) > outliers(&model.found.model.fit);
-    let open = if is_sought { base.refit_ungated().ok() } else { None };
-    let ungated = open.as_ref().and_then(|open| search_ungated(open, &model.found, catalogue));
-    let ungated = Rule::UngatedSearch.finds(ungated);
-    (ungated.map_or(model, MeanModel::of_effects), open)
+    (!is_white(&checked)).then_some(checked.correlation)
 }
 
 /// The effects beside a base fit. Where instants are noisy beside them, the base fit with that noise, and the
@@ -305,28 +236,6 @@ fn compare_with_sparse<'a>(base: &ModelFit<'a>, model: MeanModel<'a>) -> MeanMod
         Some(beside) => model.with_terms(beside),
         None => MeanModel { found: model.found.without_effects(without), ..model }.with_terms(instead),
     }
-}
-
-/// Where residuals are autocorrelated: sparse terms if they explain that. Autocorrelated measurements taken
-/// as independent make any effect too significant.
-fn explain_autocorrelation<'a>(base: ModelFit<'a>, model: MeanModel<'a>) -> AmongAll<'a> {
-    if model.unlisted.is_some() || is_white(&model.checked) {
-        return AmongAll { base, model, autocorrelation: None };
-    }
-    let correlation = model.checked.correlation;
-    let best = SparseSearch::beside(SPARSE_TERM_LEVEL, &base, &model.found.model)
-        .and_then(|search| search.best_prediction(SPARSE_TERM_LEVEL));
-    let tried = best.map(|sparse| (check(&sparse.model), sparse));
-    let spurious = tried.as_ref().is_some_and(|(_, sparse)| sparse.certain && sparse.drifts_more);
-    let spurious = Rule::SpuriousTerm.applies(spurious);
-    let explains = tried.filter(|(checked, sparse)| !sparse.drifts_more && (is_white(checked) || sparse.certain));
-    let explains = Rule::TermsExplainAutocorrelation.finds(explains);
-    let lasts = explains.is_none();
-    let model = match explains {
-        Some((_, sparse)) => model.with_terms(UncataloguedTerms::from(&base, sparse)),
-        None => model,
-    };
-    AmongAll { base, model, autocorrelation: Some(Autocorrelation { correlation, spurious, lasts }) }
 }
 
 /// Where residuals depend on something recorded: a search at a higher level of false positives, if it finds

@@ -10,7 +10,7 @@ use crate::fits::cancellation::effects_cancel;
 use crate::fits::fit_cache::FitCache;
 use crate::fits::likelihood_ratio::significant_once_refitted;
 use crate::fits::model_comparison::{
-    form_error_statistic, log_bayes_factor, log_odds_margin, log_odds_margin_of, margin_over_units, regated,
+    form_error_statistic, log_bayes_factor, log_odds_margin, log_odds_margin_of, margin_over_units,
     with_scaled_difference,
 };
 use crate::fits::profile::fit_variant;
@@ -317,33 +317,6 @@ pub(crate) fn search<'a>(mut known: FitCache<'a>, catalogue: &[Candidate], level
         }
     }
     SearchResult { tests: tests_of(&model, &extra_sigma), model, names, extra_sigma, first_scan, refusals, known }
-}
-
-/// What an ungated search finds. A large effect that shows in few measurements makes them outliers, and
-/// among the others it is not detected.
-pub(crate) fn search_ungated<'a>(
-    open: &ModelFit<'a>,
-    found: &SearchResult<'a>,
-    catalogue: &[Candidate],
-) -> Option<SearchResult<'a>> {
-    let base = found.known.base();
-    let bold = search(FitCache::of(open), catalogue, SCAN_LEVEL);
-    if bold.model.candidates.is_empty() {
-        return None;
-    }
-    let model = regated(bold.model, base, &found.model, 0.0)?;
-    let tests = tests_of(&model, &bold.extra_sigma);
-    let trials = tests_in(&bold.first_scan);
-    let is_significant = tests.iter().all(|test| test.p_value * trials <= SCAN_LEVEL);
-    let predicts = gain(&AugmentedModel::base(base), &model)
-        .map_or(true, |gain| !gain.predicts_worse() && !gain.drifts_more_by(MAX_DRIFT_INCREASE_INTERVALS));
-    (is_significant && predicts).then(|| SearchResult {
-        model,
-        tests,
-        first_scan: found.first_scan.clone(),
-        known: found.known.clone(),
-        ..bold
-    })
 }
 
 #[cfg(test)]

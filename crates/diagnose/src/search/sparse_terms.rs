@@ -9,7 +9,7 @@ use crate::candidates::covariates::{of_cycles, of_runs};
 use crate::findings::geometry_deviations::keeps_wheels;
 use crate::fits::augmented_model::{AugmentedModel, refit, refit_each};
 use crate::fits::cancellation::effects_cancel;
-use crate::fits::model_comparison::{form_error_statistic, log_bayes_factor, regated};
+use crate::fits::model_comparison::{form_error_statistic, log_bayes_factor};
 use crate::fits::null_distribution::NullDistribution;
 use crate::fits::reliability::unresolved;
 use crate::fits::scan::{Scored, scan};
@@ -55,14 +55,6 @@ impl<'a> UncataloguedTerms<'a> {
             all.tried.push((next.p_value, next.trials));
         }
         all
-    }
-
-    /// Terms that an ungated search finds: what is large in few measurements makes them outliers.
-    pub(crate) fn ungated_terms((base, open): (&ModelFit<'a>, &ModelFit<'a>)) -> Option<Self> {
-        let first = sparse(open, &AugmentedModel::base(open), SPARSE_TERM_LEVEL)?;
-        let all = Self::from(open, first);
-        let log_trials = all.log_trials();
-        Some(Self { model: regated(all.model, base, &AugmentedModel::base(base), log_trials)?, tried: all.tried })
     }
 
     /// Log Bayes factor over a fit without terms, corrected for the trials.
