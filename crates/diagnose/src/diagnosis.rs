@@ -34,10 +34,8 @@ use crate::records::stamp_errors::{
 };
 use crate::records::unknown_motion::{AnomalyKind, unknown_motions};
 use crate::search::mean_structure::{THINNED, mean_structure};
+use crate::settings::RECORDS;
 use crate::settings::large_log::MAX_RUNS;
-use crate::settings::records::{
-    MAX_REJECTED_FRACTION, MIN_COMMON_CLOCK_OFFSET_S, MIN_MEASUREMENTS_PER_RUN, MIN_REJECTING_CLOCK_OFFSET_S,
-};
 use crate::stage::{OnStage, Step};
 use crate::text;
 
@@ -178,11 +176,11 @@ fn diagnose_rows(
         return Err(DiagnoseError::TooManyRuns { runs });
     }
     let stages = |before_fit: BeforeFit| stages((datasets, large), options, before_fit);
-    let mut before_fit = BeforeFit { min_common_clock_s: MIN_COMMON_CLOCK_OFFSET_S, events: true };
+    let mut before_fit = BeforeFit { min_common_clock_s: RECORDS.min_common_clock_offset_s, events: true };
     let first = match stages(before_fit) {
         // To an instrument that is precise, a clock that is off by less makes most measurements outliers.
         Err(DiagnoseError::OdometryUncorrelated { .. }) if Rule::ClockRetry.applies(true) => {
-            before_fit.min_common_clock_s = MIN_REJECTING_CLOCK_OFFSET_S;
+            before_fit.min_common_clock_s = RECORDS.min_rejecting_clock_offset_s;
             stages(before_fit)?
         }
         result => result?,
@@ -250,7 +248,8 @@ fn stages(
     // Record faults and the base fit. One fault may mask another, so that a second is sought after the first.
     let as_recorded = EVERY_MEASUREMENT.fit(&sessions(datasets));
     let outlying = Rule::VisibleFaultsOnly.applies(as_recorded.as_ref().is_ok_and(|base| {
-        rejected_share(base) > MAX_REJECTED_FRACTION && measurements_per_run(base) < MIN_MEASUREMENTS_PER_RUN
+        rejected_share(base) > RECORDS.max_rejected_fraction
+            && measurements_per_run(base) < RECORDS.min_measurements_per_run
     }));
     let first = Rule::RecordFault.finds(fault(datasets, as_recorded.as_ref().ok(), &options.without, outlying));
     let second;
@@ -299,7 +298,7 @@ fn stages(
     let found = &structure.found.model;
     // A large effect makes outliers of what the calibrated model alone cannot follow.
     let share = rejected_share(&found.fit);
-    if faults.is_empty() && share > MAX_REJECTED_FRACTION {
+    if faults.is_empty() && share > RECORDS.max_rejected_fraction {
         return Err(DiagnoseError::OdometryUncorrelated { percent: 100.0 * share });
     }
     if !structure.base.solution.converged && !found.fit.solution.converged {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::settings::search::MATERIAL_DRIFT_INCREASE;
+use crate::settings::SEARCH;
 use calib::{CalibrationReport, Names};
 use motion_programs::Schedule;
 use serde::Serialize;
@@ -367,7 +367,8 @@ impl Gain {
     pub(crate) fn drifts_more_by(&self, half_widths: f64) -> bool {
         self.drift_percent.as_ref().is_some_and(|drift| {
             let (mean, half_width) = (0.5 * (drift.low + drift.high), 0.5 * (drift.high - drift.low));
-            mean + half_widths * half_width < 0.0 && drift.extended > (1.0 + MATERIAL_DRIFT_INCREASE) * drift.base
+            mean + half_widths * half_width < 0.0
+                && drift.extended > (1.0 + SEARCH.material_drift_increase) * drift.base
         })
     }
 }

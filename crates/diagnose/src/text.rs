@@ -13,7 +13,7 @@ use crate::document::{self, Gain, GainLevel, Subsample, UnlistedTerm, Value, Ver
 use crate::findings::alternatives::{Alternative, Status};
 use crate::findings::finding::Finding;
 use crate::records::unknown_motion::{Anomaly, AnomalyKind};
-use crate::settings::findings::MAX_EVENTS_SHOWN;
+use crate::settings::FINDINGS;
 
 /// A finding as scripts get it.
 pub(crate) fn finding(finding: &Finding) -> document::Finding {
@@ -277,9 +277,9 @@ fn anomalies(all: &[Anomaly]) -> String {
             AnomalyKind::ExtrinsicPosition | AnomalyKind::ExtrinsicHeading => format!("run {run}: {by}"),
         }
     };
-    let mut shown: Vec<String> = all.iter().take(MAX_EVENTS_SHOWN).map(event).collect();
-    if all.len() > MAX_EVENTS_SHOWN {
-        shown.push(format!("{} more", all.len() - MAX_EVENTS_SHOWN));
+    let mut shown: Vec<String> = all.iter().take(FINDINGS.max_events_shown).map(event).collect();
+    if all.len() > FINDINGS.max_events_shown {
+        shown.push(format!("{} more", all.len() - FINDINGS.max_events_shown));
     }
     let shown = shown.join("; ");
     match all.first().map(|anomaly| anomaly.kind) {

@@ -7,6 +7,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+pub use serde;
+
 macro_rules! rules {
     ($($(#[doc = $for:literal])+ $rule:ident,)*) => {
         /// A rule that may decide about a log.
@@ -285,6 +287,59 @@ pub fn decisions() -> Option<BTreeMap<String, u64>> {
     let ablation = ABLATION.get()?;
     let counts = Rule::ALL.iter().zip(&ablation.decided);
     Some(counts.map(|(rule, count)| (rule.name(), count.load(Ordering::Relaxed))).filter(|of| of.1 > 0).collect())
+}
+
+/// Settings of one subject: fields with a default each. They are data, which an ablation may vary.
+#[macro_export]
+macro_rules! settings {
+    ($name:ident $($(#[$doc:meta])* $field:ident: $of:ty = $value:expr,)*) => {
+        /// The settings of this subject.
+        #[derive(Debug, Clone, PartialEq, $crate::serde::Deserialize)]
+        #[serde(crate = "rules::serde", default, deny_unknown_fields)]
+        #[non_exhaustive]
+        pub struct $name {
+            $($(#[$doc])* pub $field: $of,)*
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self { $($field: $value,)* }
+            }
+        }
+    };
+}
+
+/// The settings of a crate by subject, each with the static that the crate reads. They can be installed once a
+/// process, before any of them is read.
+#[macro_export]
+macro_rules! rooms {
+    ($($subject:ident: $name:path as $read:ident,)*) => {
+        /// All settings of the crate.
+        #[derive(Debug, Clone, PartialEq, Default, $crate::serde::Deserialize)]
+        #[serde(crate = "rules::serde", default, deny_unknown_fields)]
+        #[non_exhaustive]
+        pub struct Settings {
+            $(
+                /// Those of the subject.
+                pub $subject: $name,
+            )*
+        }
+
+        static INSTALLED: std::sync::OnceLock<Settings> = std::sync::OnceLock::new();
+
+        /// Takes settings in place of the defaults.
+        ///
+        /// # Errors
+        /// [`rules::SwitchedBefore`] where settings were installed or read before.
+        pub fn install(settings: Settings) -> Result<(), $crate::SwitchedBefore> {
+            INSTALLED.set(settings).map_err(|_| $crate::SwitchedBefore)
+        }
+
+        $(
+            pub(crate) static $read: std::sync::LazyLock<$name> =
+                std::sync::LazyLock::new(|| INSTALLED.get_or_init(Settings::default).$subject.clone());
+        )*
+    };
 }
 
 #[cfg(test)]

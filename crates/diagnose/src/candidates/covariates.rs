@@ -1,6 +1,6 @@
 //! Covariates that depend on the records: those of runs, and cycles of a wheel's turn.
 
-use crate::settings::search::WHEEL_CYCLES;
+use crate::settings::SEARCH;
 use effects::{Channel, Covariate, Sparse};
 use estimation::ModelFit;
 use kinematics::Side;
@@ -24,5 +24,5 @@ pub(crate) fn values_of_runs(fit: &ModelFit<'_>, key: &str) -> Vec<f64> {
 pub(crate) fn of_cycles(side: Side) -> Vec<Sparse> {
     let channel = if side == Side::Left { Channel::LeftWheel } else { Channel::RightWheel };
     let phases = |cycles| [Covariate::CosPhase(side, cycles), Covariate::SinPhase(side, cycles)];
-    WHEEL_CYCLES.into_iter().flat_map(phases).map(|phase| Sparse { channel, covariates: vec![phase] }).collect()
+    SEARCH.wheel_cycles.into_iter().flat_map(phases).map(|phase| Sparse { channel, covariates: vec![phase] }).collect()
 }

@@ -5,9 +5,7 @@ use std::collections::BTreeMap;
 use dataset::Protocol;
 use estimation::{ModelFit, PathShape};
 
-use crate::settings::carry_over::{
-    CONSTANT_CURVATURE_SPREAD, MAX_STRAIGHT_TURN_RATIO, MIN_SPIN_TURN_RATIO, ONE_SENSE_SHARE,
-};
+use crate::settings::CARRY_OVER;
 
 /// The kind of every run, by session and run.
 pub(crate) fn kinds_of_runs(fit: &ModelFit<'_>) -> BTreeMap<(usize, usize), &'static str> {
@@ -34,11 +32,13 @@ const fn kind_of(protocol: Option<Protocol>) -> Option<&'static str> {
 fn by_shape(shape: &PathShape) -> &'static str {
     // Travel of the wheels against each other over that along.
     let turns = shape.turn_travel_m / shape.distance_m.max(f64::MIN_POSITIVE);
-    if turns > MIN_SPIN_TURN_RATIO {
+    if turns > CARRY_OVER.min_spin_turn_ratio {
         "spin"
-    } else if turns < MAX_STRAIGHT_TURN_RATIO {
+    } else if turns < CARRY_OVER.max_straight_turn_ratio {
         "straight"
-    } else if shape.net_turn_share > ONE_SENSE_SHARE && shape.curvature_spread < CONSTANT_CURVATURE_SPREAD {
+    } else if shape.net_turn_share > CARRY_OVER.one_sense_share
+        && shape.curvature_spread < CARRY_OVER.constant_curvature_spread
+    {
         "circle"
     } else {
         "mixed"

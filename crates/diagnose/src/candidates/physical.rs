@@ -7,7 +7,7 @@ use model_term::TermParameter;
 use crate::candidates::candidate::Candidate;
 use crate::fits::augmented_model::AugmentedModel;
 use crate::fits::wald::wald_test;
-use crate::settings::search::{INSIGNIFICANT_ESTIMATE_SIGMAS, MAX_CONTACT_VARIANCE_RATIO, MAX_PLAUSIBLE_SIZES};
+use crate::settings::SEARCH;
 
 /// Whether a candidate's sizes make an effect that can be: a share that is lost is no gain.
 pub(crate) fn is_physical(extended: &AugmentedModel<'_>, index: usize) -> bool {
@@ -34,7 +34,7 @@ pub(crate) fn is_plausible(extended: &AugmentedModel<'_>, index: usize) -> bool 
 fn are_plausible(parameters: &[TermParameter], estimates: &[(f64, f64)]) -> bool {
     // An error that is not determined shows nothing.
     !parameters.iter().zip(estimates).any(|(parameter, (size, sigma))| {
-        size.abs() - INSIGNIFICANT_ESTIMATE_SIGMAS * sigma > MAX_PLAUSIBLE_SIZES * parameter.prior_sigma
+        size.abs() - SEARCH.insignificant_estimate_sigmas * sigma > SEARCH.max_plausible_sizes * parameter.prior_sigma
     })
 }
 
@@ -45,7 +45,7 @@ pub(crate) fn effect_of(candidate: &Candidate, estimates: &[(f64, f64)]) -> Opti
     let fitted = parameters.iter().zip(estimates);
     let estimates: Vec<(&str, f64)> = fitted
         .map(|(parameter, (size, sigma))| {
-            (parameter.name, if size.abs() < INSIGNIFICANT_ESTIMATE_SIGMAS * sigma { 0.0 } else { *size })
+            (parameter.name, if size.abs() < SEARCH.insignificant_estimate_sigmas * sigma { 0.0 } else { *size })
         })
         .chain(candidate.fixed())
         .collect();
@@ -62,7 +62,7 @@ fn scatters_enough(extended: &AugmentedModel<'_>, contact_m: f64) -> bool {
     let along = variance(NoiseComponent::MeasurementPosition) + 0.5 * wheel;
     let heading = variance(NoiseComponent::MeasurementHeading) + 2.0 * wheel / separation_m.powi(2);
     let of_both = contact_m * contact_m;
-    (0.5 * of_both / along).max(2.0 * of_both / separation_m.powi(2) / heading) <= MAX_CONTACT_VARIANCE_RATIO
+    (0.5 * of_both / along).max(2.0 * of_both / separation_m.powi(2) / heading) <= SEARCH.max_contact_variance_ratio
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::settings::carry_over::{MIN_POWER_SIGMAS, MIN_SIGMAS_OF_OTHERS};
+use crate::settings::CARRY_OVER;
 
 /// A unit against all others.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,7 +30,7 @@ impl Contrast {
 
     /// Do the others determine the size, and would the unit show it?
     pub(crate) fn is_testable(&self) -> bool {
-        self.sigmas_of_others >= MIN_SIGMAS_OF_OTHERS && self.power_sigmas >= MIN_POWER_SIGMAS
+        self.sigmas_of_others >= CARRY_OVER.min_sigmas_of_others && self.power_sigmas >= CARRY_OVER.min_power_sigmas
     }
 }
 

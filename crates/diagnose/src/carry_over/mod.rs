@@ -27,10 +27,7 @@ use crate::carry_over::heterogeneity::Heterogeneity;
 use crate::document::Value;
 use crate::fits::augmented_model::AugmentedModel;
 use crate::fits::statistics::{holm, p_of_z};
-use crate::settings::carry_over::{
-    HETEROGENEITY_LEVEL, MAX_LESS_THAN_HALF, MIN_SIGMAS_OF_OTHERS, MIN_TESTABLE_UNITS, REFUTED_LEVEL, SUPPORTED_SIGMAS,
-};
-use crate::settings::levels::MIN_RUNS;
+use crate::settings::{CARRY_OVER, LEVELS};
 
 /// What is a unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -161,32 +158,34 @@ fn verdict(by_level: &[SizesByUnit]) -> (Option<bool>, String) {
         let z = |contrast: &Contrast| contrast.value.0 / contrast.value.1;
         let p_below: Vec<f64> =
             testable.iter().map(|(_, of)| if z(of) < 0.0 { 0.5 * p_of_z(z(of)) } else { 1.0 }).collect();
-        let refuted = holm(&p_below, REFUTED_LEVEL);
+        let refuted = holm(&p_below, CARRY_OVER.refuted_level);
         if let Some(((name, _), _)) = testable.iter().zip(refuted).find(|(_, refuted)| *refuted) {
             return (Some(false), format!("{noun} {name} has less than half of the size that the others give it"));
         }
         let of = sizes.units.len();
-        let scatters =
-            sizes.heterogeneity.filter(|of| of.less_than_half > MAX_LESS_THAN_HALF && of.p_value < HETEROGENEITY_LEVEL);
+        let scatters = sizes.heterogeneity.filter(|of| {
+            of.less_than_half > CARRY_OVER.max_less_than_half && of.p_value < CARRY_OVER.heterogeneity_level
+        });
         if let Some(Heterogeneity { tau, less_than_half, .. }) = scatters {
             open.push(format!(
                 "sizes scatter by {:.0} % over each {noun}: another one has less than half with a probability of {:.2}",
                 100.0 * tau,
                 less_than_half
             ));
-        } else if testable.len() >= MIN_TESTABLE_UNITS
-            && testable.iter().all(|(_, contrast)| z(contrast) > SUPPORTED_SIGMAS)
+        } else if testable.len() >= CARRY_OVER.min_testable_units
+            && testable.iter().all(|(_, contrast)| z(contrast) > CARRY_OVER.supported_sigmas)
         {
             supported.push(format!("{} of {of} by {noun}", testable.len()));
         } else {
-            let plain =
-                |unit: &&UnitShare| unit.own.is_some_and(|(share, sigma)| share.abs() > MIN_SIGMAS_OF_OTHERS * sigma);
+            let plain = |unit: &&UnitShare| {
+                unit.own.is_some_and(|(share, sigma)| share.abs() > CARRY_OVER.min_sigmas_of_others * sigma)
+            };
             let shown: Vec<&str> = sizes.units.iter().filter(plain).map(|unit| unit.name.as_str()).collect();
             open.push(match (&shown[..], testable.len()) {
                 ([only], _) => format!("only {noun} {only} shows it"),
-                (_, tested) if tested < MIN_TESTABLE_UNITS => format!("{tested} of {of} testable by {noun}"),
+                (_, tested) if tested < CARRY_OVER.min_testable_units => format!("{tested} of {of} testable by {noun}"),
                 _ => {
-                    let weak = testable.iter().find(|(_, contrast)| z(contrast) <= SUPPORTED_SIGMAS);
+                    let weak = testable.iter().find(|(_, contrast)| z(contrast) <= CARRY_OVER.supported_sigmas);
                     format!("too weak in {noun} {}", weak.map_or("", |(name, _)| name))
                 }
             });
@@ -280,7 +279,7 @@ impl System {
         let step = -(&by_noise * &sum.gradient);
         let own = |matrix: &DMatrix<f64>| matrix.view((self.shared, self.shared), (units, units)).into_owned();
         let mut covariance = own(&by_noise);
-        if runs.len() >= MIN_RUNS + units {
+        if runs.len() >= LEVELS.min_runs + units {
             let ClusterRobust { covariance: by_runs, left_out } = ClusterRobust::of(&by_noise, runs);
             let by_runs = own(&by_runs);
             if left_out == 0 && by_runs.trace() > covariance.trace() {

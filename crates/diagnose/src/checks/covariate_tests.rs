@@ -12,7 +12,7 @@ use crate::fits::augmented_model::AugmentedModel;
 use crate::fits::null_distribution::NullDistribution;
 use crate::fits::scan::{detectable_statistic, freedom, scan_parts_of};
 use crate::fits::statistics::{p_of_score, sidak};
-use crate::settings::residuals::RESIMULATED_LEVEL;
+use crate::settings::RESIDUALS;
 
 /// A quantity on which residuals may depend.
 struct Question {
@@ -126,7 +126,7 @@ fn deflated(
     mut answers: Vec<Option<Answer>>,
 ) -> Vec<Option<Answer>> {
     let matter: Vec<usize> = (0..answers.len())
-        .filter(|part| answers[*part].is_some_and(|answer| answer.p_value < RESIMULATED_LEVEL))
+        .filter(|part| answers[*part].is_some_and(|answer| answer.p_value < RESIDUALS.resimulated_level))
         .collect();
     let groups_that_matter: Vec<&[Candidate]> = matter.iter().map(|part| parts[*part]).collect();
     for (part, inflation) in matter.into_iter().zip(null.inflation(&groups_that_matter)) {

@@ -18,9 +18,7 @@ use kinematics::wrap_to_pi;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::records::clock_profile::turns_at;
-use crate::settings::residuals::{
-    DECAYS_AT_REST, MAX_POSES_OF_STANDSTILL, MIN_POSES_AT_REST, REST_MARGIN_S, WHITE_AT_REST_LOG_ODDS,
-};
+use crate::settings::RESIDUALS;
 
 /// Errors of an instrument while the robot stands, beside residuals of its drives that are autocorrelated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,14 +48,14 @@ pub(crate) fn errors_at_rest(datasets: &[Dataset], coefficient: f64) -> ErrorsAt
             }
         }
     }
-    let known = standstills.iter().filter(|of| of.iter().map(Vec::len).sum::<usize>() >= MIN_POSES_AT_REST);
+    let known = standstills.iter().filter(|of| of.iter().map(Vec::len).sum::<usize>() >= RESIDUALS.min_poses_at_rest);
     // Sums over the components; 0 where nothing is known.
     let [over_fast, over_any] = known
         .filter_map(|of| log_odds_of_white(of, coefficient))
         .fold([0.0; 2], |[fast, any], of| [fast + of[0], any + of[1]]);
-    if over_any > WHITE_AT_REST_LOG_ODDS {
+    if over_any > RESIDUALS.white_at_rest_log_odds {
         ErrorsAtRest::White
-    } else if over_fast > WHITE_AT_REST_LOG_ODDS {
+    } else if over_fast > RESIDUALS.white_at_rest_log_odds {
         ErrorsAtRest::WhiteOrSlow
     } else {
         ErrorsAtRest::Autocorrelated
@@ -69,7 +67,7 @@ pub(crate) fn errors_at_rest(datasets: &[Dataset], coefficient: f64) -> ErrorsAt
 fn log_odds_of_white(standstills: &[Vec<f64>], coefficient: f64) -> Option<[f64; 2]> {
     let white = cost(standstills, Decay { share: 0.0, by: 0.0 })?;
     // From all of them decaying at once to a share that hardly decays.
-    let decays = (0..DECAYS_AT_REST).map(|halved| coefficient.powf(0.5_f64.powi(halved)));
+    let decays = (0..RESIDUALS.decays_at_rest).map(|halved| coefficient.powf(0.5_f64.powi(halved)));
     let mut over = decays.filter_map(|by| Some(cost(standstills, Decay { share: coefficient / by, by })? - white));
     let over_fast = over.next()?;
     Some([over_fast, over.fold(over_fast, f64::min)])
@@ -79,13 +77,13 @@ fn log_odds_of_white(standstills: &[Vec<f64>], coefficient: f64) -> Option<[f64;
 fn standstills_of(run: &RunView<'_>, track: &WheelAngleInterpolator<'_>) -> Vec<Range<usize>> {
     let (rows_s, truth) = (&run.odometry().t_s, &run.run().truth);
     let stands = |from_s: f64, to_s: f64| {
-        let covered = rows_s.first().is_some_and(|first_s| *first_s <= from_s + REST_MARGIN_S)
-            && rows_s.last().is_some_and(|last_s| *last_s >= to_s - REST_MARGIN_S);
+        let covered = rows_s.first().is_some_and(|first_s| *first_s <= from_s + RESIDUALS.rest_margin_s)
+            && rows_s.last().is_some_and(|last_s| *last_s >= to_s - RESIDUALS.rest_margin_s);
         covered && turns_at(rows_s, track.turns(), from_s) == turns_at(rows_s, track.turns(), to_s)
     };
     let mut found: Vec<Range<usize>> = Vec::new();
     for pose in 1..truth.len() {
-        let [from_s, to_s] = [truth[pose - 1].t_s - REST_MARGIN_S, truth[pose].t_s + REST_MARGIN_S];
+        let [from_s, to_s] = [truth[pose - 1].t_s - RESIDUALS.rest_margin_s, truth[pose].t_s + RESIDUALS.rest_margin_s];
         if !stands(from_s, to_s) {
             continue;
         }
@@ -119,7 +117,7 @@ impl Decay {
 fn cost(standstills: &[Vec<f64>], decay: Decay) -> Option<f64> {
     let mut correlations: BTreeMap<usize, Cholesky<f64, Dyn>> = BTreeMap::new();
     let (mut squares, mut freedom, mut logs) = (0.0, 0.0, 0.0);
-    for values in standstills.iter().flat_map(|values| values.chunks(MAX_POSES_OF_STANDSTILL)) {
+    for values in standstills.iter().flat_map(|values| values.chunks(RESIDUALS.max_poses_of_standstill)) {
         let number = values.len();
         if number < 2 {
             continue;

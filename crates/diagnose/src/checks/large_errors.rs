@@ -3,7 +3,7 @@
 use estimation::{InnovationComponent, ModelFit, Segment};
 use kinematics::Wheels;
 
-use crate::settings::residuals::{LARGE_INNOVATION_SIGMAS, MAX_ERROR_GAP, RAMP_ERROR_FRACTION};
+use crate::settings::RESIDUALS;
 
 /// A measurement with a large innovation.
 #[derive(Debug, Clone)]
@@ -74,16 +74,16 @@ pub(crate) fn large_errors(fit: &ModelFit<'_>, innovations: &[Vec<InnovationComp
     let mut found = Vec::new();
     let mut last: Option<(usize, usize)> = None;
     for (number, (measurement, (segment, ramp))) in measurements.into_iter().enumerate() {
-        if measurement.z <= LARGE_INNOVATION_SIGMAS {
+        if measurement.z <= RESIDUALS.large_innovation_sigmas {
             continue;
         }
-        let is_same_error =
-            last.is_some_and(|(at, of)| number - at <= MAX_ERROR_GAP && fit.records.are_in_series(of, segment));
+        let is_same_error = last
+            .is_some_and(|(at, of)| number - at <= RESIDUALS.max_error_gap && fit.records.are_in_series(of, segment));
         last = Some((number, segment));
         if is_same_error {
             continue;
         }
-        let mostly = RAMP_ERROR_FRACTION.max(share);
+        let mostly = RESIDUALS.ramp_error_fraction.max(share);
         let ramp_odds = if ramp { mostly / share } else { (1.0 - mostly) / (1.0 - share) };
         let relative_distance = if mean_m > 0.0 { measurement.relative_distance / mean_m } else { 0.0 };
         found.push(LargeError { relative_distance, ramp_odds, ..measurement });

@@ -25,10 +25,8 @@ use statrs::distribution::{ContinuousCDF, Normal};
 use crate::candidates::candidate::terms;
 use crate::checks::large_errors::{LargeError, large_errors, mean_speed_m_s};
 use crate::fits::augmented_model::AugmentedModel;
-use crate::settings::residuals::{
-    ERRORS_PER_PASS, INSTANT_TOLERANCE_S, JUMP_TIME_FRACTIONS, MAX_LARGE_ERRORS, MEASUREMENT_ERROR_SCALES,
-    OTHER_CAUSE_PROBABILITY,
-};
+use crate::settings::RESIDUALS;
+use crate::settings::residuals::JUMP_TIME_FRACTIONS;
 
 /// Columns of a large error: travel that each wheel loses at each instant; travel lost for a change of its
 /// speed; errors of the measurement, and of the one before; a jump before the measurement.
@@ -83,7 +81,7 @@ impl ModelTerm for Jump {
         for (k, side) in Side::BOTH.into_iter().enumerate() {
             gradient[SLIDES + k] = lost(side, gained_m_s[side]);
         }
-        if end_s > self.at_s - INSTANT_TOLERANCE_S {
+        if end_s > self.at_s - RESIDUALS.instant_tolerance_s {
             gradient[ANY..].copy_from_slice(&POSE_AXES);
         }
     }
@@ -93,7 +91,7 @@ impl ModelTerm for Jump {
             return;
         }
         for (at_s, column) in [(self.at_s, AT), (self.from_s, FROM)] {
-            if (measurement.t_s - at_s).abs() < INSTANT_TOLERANCE_S {
+            if (measurement.t_s - at_s).abs() < RESIDUALS.instant_tolerance_s {
                 gradient[column..column + 3].copy_from_slice(&POSE_AXES);
             }
         }
@@ -124,9 +122,9 @@ pub(crate) fn log_likelihoods(
     let fit = model.fit.evaluated_ungated();
     let mut large = large_errors(&fit, &fit.scan(&mut terms(&model.candidates)).innovations);
     large.sort_by(|a, b| b.z.total_cmp(&a.z));
-    large.truncate(MAX_LARGE_ERRORS);
+    large.truncate(RESIDUALS.max_large_errors);
     let of_passes: Vec<Vec<ErrorResponse>> =
-        large.par_chunks(ERRORS_PER_PASS).map(|large| responses(model, &fit, large)).collect();
+        large.par_chunks(RESIDUALS.errors_per_pass).map(|large| responses(model, &fit, large)).collect();
     let responses = of_passes.concat();
     if responses.is_empty() {
         return None;
@@ -150,7 +148,10 @@ fn of_causes(causes: &[Vec<Vec<f64>>]) -> Vec<f64> {
         // Over the best explanation of each: what is common to all causes.
         own.iter()
             .zip(&best)
-            .map(|(own, best)| ((1.0 - OTHER_CAUSE_PROBABILITY) * (own - best).exp() + OTHER_CAUSE_PROBABILITY).ln())
+            .map(|(own, best)| {
+                ((1.0 - RESIDUALS.other_cause_probability) * (own - best).exp() + RESIDUALS.other_cause_probability)
+                    .ln()
+            })
             .sum()
     };
     causes.iter().map(|scales| log_mean(&scales.iter().map(at_scale).collect::<Vec<_>>())).collect()
@@ -291,9 +292,10 @@ fn of_any(source: ErrorSource, responses: &[ErrorResponse]) -> Vec<Vec<f64>> {
         ErrorSource::Instrument => &[ErrorResponse::of_measurement],
     };
     let both = kinds.iter().flat_map(|of| {
-        MEASUREMENT_ERROR_SCALES
+        RESIDUALS
+            .measurement_error_scales
             .iter()
-            .flat_map(move |m| MEASUREMENT_ERROR_SCALES.iter().map(move |rad| (of, *m, *rad)))
+            .flat_map(move |m| RESIDUALS.measurement_error_scales.iter().map(move |rad| (of, *m, *rad)))
     });
     both.map(|(of, jump_m, jump_rad)| responses.iter().map(|response| of(response, jump_m, jump_rad)).collect())
         .collect()

@@ -14,12 +14,7 @@ use crate::fits::augmented_model::AugmentedModel;
 use crate::fits::null_distribution::{NullDistribution, among_simulated, beyond_simulated};
 use crate::fits::statistics::{holm, p_of_chi_square, p_of_z};
 use crate::settings::levels::CHECKS_LEVEL;
-use crate::settings::residuals::{
-    AFTER_OUTLIER_LEVEL, CANCELLATION_RATIO, MAX_WITHIN_ROW_SHARE, MIN_KURTOSIS_INNOVATIONS, MIN_WHITENESS_INNOVATIONS,
-    MIN_WHITENESS_PAIRS, OUTLIER_PROBABILITY, PERSISTENCE_SIGMAS, RESIMULATED_LEVEL, TAIL_INNOVATION_SIGMAS,
-    WHITENESS_LAGS,
-};
-use crate::settings::search::AUTOCORRELATION_SIGMAS;
+use crate::settings::{RESIDUALS, SEARCH};
 
 /// What the checks of a model say.
 pub(crate) struct Checked {
@@ -49,8 +44,8 @@ pub(crate) fn check(model: &AugmentedModel<'_>) -> Checked {
     let null = NullDistribution::of(model);
     let NoiseTests { mut checks, mut correlation, mut outliers } = noise_tests(fit);
     // What simulated runs say makes no test stricter: where none could fail, they are not asked.
-    let matters =
-        checks.iter().any(|test| test.p_value < RESIMULATED_LEVEL) || correlation.1.abs() >= AUTOCORRELATION_SIGMAS;
+    let matters = checks.iter().any(|test| test.p_value < RESIDUALS.resimulated_level)
+        || correlation.1.abs() >= SEARCH.autocorrelation_sigmas;
     if let Some(null) = null.as_ref().filter(|_| matters) {
         let simulated = null.resimulated(|fit| {
             let tests = noise_tests(fit);
@@ -111,7 +106,7 @@ fn innovations<'f>(fit: &'f ModelFit<'_>, component: usize) -> Vec<&'f Innovatio
 /// Whether a measurement's error is of the fitted noise: what nobody recorded of the motion within rows has a
 /// size that is known roughly, and tails of its own.
 fn is_tested_by_size(fit: &ModelFit<'_>, (segment, measurement): (usize, usize)) -> bool {
-    fit.within_row_share(segment, measurement) <= MAX_WITHIN_ROW_SHARE
+    fit.within_row_share(segment, measurement) <= RESIDUALS.max_within_row_share
 }
 
 /// The innovations whose size and tails are tested.
@@ -159,13 +154,13 @@ fn whiteness(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) -> (f64,
     for (component, name) in Component::ALL.into_iter().enumerate() {
         let series = innovations(fit, component);
         let n = series.len() as f64;
-        if n < MIN_WHITENESS_INNOVATIONS {
+        if n < RESIDUALS.min_whiteness_innovations {
             continue;
         }
         let variance = series.iter().map(|innovation| innovation.z.powi(2)).sum::<f64>() / n;
         let (mut statistic, mut lags, mut coefficient) = (0.0, 0.0, 0.0);
         let (mut weighted_products, mut squared_weights) = (0.0, 0.0_f64);
-        for lag in 1..=WHITENESS_LAGS {
+        for lag in 1..=RESIDUALS.whiteness_lags {
             let (mut products, mut pairs) = (0.0, 0.0_f64);
             let follows =
                 |pair: &&[&InnovationComponent]| fit.records.are_in_series(pair[0].segment, pair[lag].segment);
@@ -176,7 +171,7 @@ fn whiteness(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) -> (f64,
                 weighted_products += weight * pair[0].z * pair[lag].z;
                 squared_weights += weight * weight;
             }
-            if pairs < MIN_WHITENESS_PAIRS {
+            if pairs < RESIDUALS.min_whiteness_pairs {
                 break;
             }
             let z = products / variance / pairs.sqrt();
@@ -201,7 +196,7 @@ fn tails(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) {
     for (component, name) in Component::ALL.into_iter().enumerate() {
         let series = tested(fit, component);
         let n = series.len() as f64;
-        if n < MIN_KURTOSIS_INNOVATIONS {
+        if n < RESIDUALS.min_kurtosis_innovations {
             continue;
         }
         let moment = |power: i32| series.iter().map(|innovation| innovation.z.powi(power)).sum::<f64>() / n;
@@ -259,13 +254,14 @@ fn outliers(fit: &ModelFit<'_>) -> Outliers {
         let follows = position
             .checked_sub(1)
             .is_some_and(|before| rejected[before].0 == segment && rejected[before].1 + 1 == measurement);
-        if followed || follows || (values > 0.0 && p_of_chi_square(square, values) < AFTER_OUTLIER_LEVEL) {
+        if followed || follows || (values > 0.0 && p_of_chi_square(square, values) < RESIDUALS.after_outlier_level) {
             found.persistent += 1;
         } else {
             found.isolated += 1;
         }
     }
-    let (count, expected) = (rejected.len() as f64, (found.measurements + rejected.len()) as f64 * OUTLIER_PROBABILITY);
+    let (count, expected) =
+        (rejected.len() as f64, (found.measurements + rejected.len()) as f64 * RESIDUALS.outlier_probability);
     // A Poisson count at least as large: the χ² with twice the count degrees of freedom is less than twice
     // the mean.
     found.p_value = if count > 0.0 { 1.0 - p_of_chi_square(2.0 * expected, 2.0 * count) } else { 1.0 };
@@ -275,7 +271,7 @@ fn outliers(fit: &ModelFit<'_>) -> Outliers {
 /// Whether two successive displacements cancel: whether together they are nearer to dead reckoning.
 fn cancel(fit: &ModelFit<'_>, first: usize, second: usize, wrong: usize) -> bool {
     let of = |segments| fit.mahalanobis_distance(segments).unwrap_or(f64::INFINITY);
-    fit.records.continues(second) && of(first..second + 1) < CANCELLATION_RATIO * of(wrong..wrong + 1)
+    fit.records.continues(second) && of(first..second + 1) < RESIDUALS.cancellation_ratio * of(wrong..wrong + 1)
 }
 
 /// Persistence of large innovations of a component: the mean of the next ones in the same direction, in
@@ -284,7 +280,8 @@ pub(crate) fn residual_persistence(model: &AugmentedModel<'_>, component: usize)
     let fit = &*model.fit.with_innovations(&mut terms(&model.candidates));
     let series = innovations(fit, component);
     let large = |pair: &&[&InnovationComponent]| {
-        pair[0].z.abs() > TAIL_INNOVATION_SIGMAS && is_tested_by_size(fit, (pair[0].segment, pair[0].measurement))
+        pair[0].z.abs() > RESIDUALS.tail_innovation_sigmas
+            && is_tested_by_size(fit, (pair[0].segment, pair[0].measurement))
     };
     let follows = |is_next: &dyn Fn(usize, usize) -> bool| {
         let pairs = series.windows(2).filter(large).filter(|pair| is_next(pair[0].segment, pair[1].segment));
@@ -293,9 +290,9 @@ pub(crate) fn residual_persistence(model: &AugmentedModel<'_>, component: usize)
     };
     let of_measurements = follows(&|segment, next| next == segment);
     let of_displacements = follows(&|segment, next| next == segment + 1 && fit.records.continues(next));
-    if of_measurements > PERSISTENCE_SIGMAS {
+    if of_measurements > RESIDUALS.persistence_sigmas {
         ResidualPersistence::Persistent
-    } else if of_measurements.min(of_displacements) < -PERSISTENCE_SIGMAS {
+    } else if of_measurements.min(of_displacements) < -RESIDUALS.persistence_sigmas {
         ResidualPersistence::Reverting
     } else {
         ResidualPersistence::Undecided

@@ -18,7 +18,7 @@ use serde::Serialize;
 use crate::candidates::candidate::terms;
 use crate::fits::augmented_model::AugmentedModel;
 use crate::fits::statistics::p_of_chi_square;
-use crate::settings::residuals::{BINS, COVARIATE_TOLERANCE, MIN_BIN_WIDTH, MIN_RESIDUALS_PER_BIN};
+use crate::settings::RESIDUALS;
 
 /// Residuals against every covariate.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -258,37 +258,39 @@ fn edges(values: &mut [(f64, f64, f64)], periodic: bool, min_span: f64) -> Optio
     values.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (first, last) = (values.first()?.0, values.last()?.0);
     let span = last - first;
-    if span <= min_span.max(COVARIATE_TOLERANCE * first.abs().max(last.abs())) {
+    if span <= min_span.max(RESIDUALS.covariate_tolerance * first.abs().max(last.abs())) {
         return None;
     }
-    let share = |k: usize| k as f64 / BINS as f64;
+    let share = |k: usize| k as f64 / RESIDUALS.bins as f64;
     if periodic {
         // About the middle of a bin, not its edge: robots like to start at 0.
-        return Some((0..BINS).map(|k| 360.0 * (share(k) + 0.5 * share(1)) - 180.0).collect());
+        return Some((0..RESIDUALS.bins).map(|k| 360.0 * (share(k) + 0.5 * share(1)) - 180.0).collect());
     }
     let mut levels: Vec<f64> = Vec::new();
     for (value, ..) in values.iter() {
-        if levels.last().is_none_or(|level| value - level > COVARIATE_TOLERANCE * span) {
+        if levels.last().is_none_or(|level| value - level > RESIDUALS.covariate_tolerance * span) {
             levels.push(*value);
         }
-        if levels.len() > BINS {
+        if levels.len() > RESIDUALS.bins {
             break;
         }
     }
-    if levels.len() <= BINS {
+    if levels.len() <= RESIDUALS.bins {
         return Some(levels.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect());
     }
     let mut edges: Vec<f64> = Vec::new();
-    for k in 1..BINS {
-        let edge = values[k * values.len() / BINS].0;
-        if edge - edges.last().copied().unwrap_or(first) > MIN_BIN_WIDTH * span && last - edge > MIN_BIN_WIDTH * span {
+    for k in 1..RESIDUALS.bins {
+        let edge = values[k * values.len() / RESIDUALS.bins].0;
+        if edge - edges.last().copied().unwrap_or(first) > RESIDUALS.min_bin_width * span
+            && last - edge > RESIDUALS.min_bin_width * span
+        {
             edges.push(edge);
         }
     }
-    if 2 * edges.len() < BINS {
+    if 2 * edges.len() < RESIDUALS.bins {
         // Most values are at a few levels, such as commanded speeds: equal widths keep levels whole and
         // separate.
-        edges = (1..BINS).map(|k| first + span * share(k)).collect();
+        edges = (1..RESIDUALS.bins).map(|k| first + span * share(k)).collect();
     }
     Some(edges)
 }
@@ -307,7 +309,7 @@ fn profile(values: &[(f64, f64, f64)], edges: &[f64]) -> Profile {
         let to = from + values[from..].partition_point(|(value, ..)| *value < edge);
         let own = &values[from..to];
         from = to;
-        if own.len() < MIN_RESIDUALS_PER_BIN {
+        if own.len() < RESIDUALS.min_residuals_per_bin {
             continue;
         }
         let n = own.len() as f64;

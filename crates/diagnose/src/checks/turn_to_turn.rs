@@ -8,8 +8,8 @@ use model_term::{Interval, ModelTerm, TermParameter};
 use crate::candidates::candidate::terms;
 use crate::fits::augmented_model::AugmentedModel;
 use crate::fits::statistics::p_of_differing_scores;
-use crate::settings::residuals::{TURN_BEGINS_AT, TURN_ENDS_AT, TURNS_PER_RUN};
-use crate::settings::search::DECIMATION_STEP_S;
+use crate::settings::residuals::TURNS_PER_RUN;
+use crate::settings::{RESIDUALS, SEARCH};
 
 /// p-value of a wheelbase that differs so much between turns, were it constant: each turn's score by a share
 /// of its own, which the turn is larger by, with the score's variance.
@@ -21,7 +21,7 @@ use crate::settings::search::DECIMATION_STEP_S;
 /// first ones.
 /// Reference: Chesher 1984 (the score test of a random coefficient).
 pub(crate) fn differs_from_turn_to_turn(model: &AugmentedModel<'_>) -> f64 {
-    let coarse = model.fit.decimated(&mut terms(&model.candidates), DECIMATION_STEP_S);
+    let coarse = model.fit.decimated(&mut terms(&model.candidates), SEARCH.decimation_step_s);
     let fit = coarse.as_ref().unwrap_or(&model.fit);
     let mut all = terms(&model.candidates);
     all.push(Box::new(EachTurn::default()));
@@ -67,10 +67,10 @@ impl ModelTerm for EachTurn {
     fn motion(&mut self, interval: &Interval<'_>, gradient: &mut [Pose]) {
         let turn_rad = interval.smooth_increment().turn_rad;
         let rate_rad_s = if interval.dt_s > 0.0 { turn_rad.abs() / interval.dt_s } else { 0.0 };
-        if self.is_over && rate_rad_s > TURN_BEGINS_AT * self.largest_rad_s {
+        if self.is_over && rate_rad_s > RESIDUALS.turn_begins_at * self.largest_rad_s {
             (self.turns, self.largest_rad_s, self.is_over) = (self.turns + 1, rate_rad_s, false);
         }
-        self.is_over = self.is_over || rate_rad_s < TURN_ENDS_AT * self.largest_rad_s;
+        self.is_over = self.is_over || rate_rad_s < RESIDUALS.turn_ends_at * self.largest_rad_s;
         if !self.is_over {
             self.largest_rad_s = self.largest_rad_s.max(rate_rad_s);
         }

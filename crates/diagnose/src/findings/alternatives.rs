@@ -9,7 +9,7 @@ use crate::records::stamp_errors::StampError;
 use crate::search::ranking::tests_in;
 use crate::search::rivals::Refusal;
 use crate::search::selection::SearchResult;
-use crate::settings::levels::{MIN_QUANTILE_P_VALUE, SCAN_LEVEL};
+use crate::settings::LEVELS;
 
 /// An effect of the catalogue beside the calibration alone, before any effect was in the model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -102,7 +102,7 @@ pub(crate) fn alternatives(
         .iter()
         .map(|entry| {
             let (id, log_odds) = (entry.scored.candidate.id(), entry.scored.log_odds);
-            let z = if entry.p_value > MIN_QUANTILE_P_VALUE {
+            let z = if entry.p_value > LEVELS.min_quantile_p_value {
                 z_of_p(entry.p_value)
             } else {
                 entry.scored.statistic.sqrt()
@@ -115,7 +115,7 @@ pub(crate) fn alternatives(
                 Status::NotResolved
             } else if entry.scored.dimensions == 0 {
                 Status::NotDetectable
-            } else if entry.p_value * tests > SCAN_LEVEL {
+            } else if entry.p_value * tests > LEVELS.scan_level {
                 // By its score; refitted it may have been.
                 let of_refit = found.refusals.get(id).filter(|refusal| refusal.is_for_other_runs());
                 of_refit.map_or(Status::NotSignificant, |refusal| Status::Refused(*refusal))

@@ -8,8 +8,7 @@ use crate::document::{Blind, Smallest};
 use crate::findings::alternatives::NOT_RESOLVED;
 use crate::fits::augmented_model::AugmentedModel;
 use crate::fits::fit_cache::FitCache;
-use crate::settings::levels::DETECTION_SQRT_LAMBDA;
-use crate::settings::search::MAX_DETECTION_LIMIT_PRIOR_SIGMAS;
+use crate::settings::{LEVELS, SEARCH};
 
 /// Detection limit of every candidate beside a model; second, the candidates whose limit is above a
 /// plausible size.
@@ -26,7 +25,9 @@ pub(crate) fn detectability(
             .parameters
             .iter()
             .enumerate()
-            .map(|(k, parameter)| (parameter, DETECTION_SQRT_LAMBDA / scored.information[(k, k)].max(0.0).sqrt()))
+            .map(|(k, parameter)| {
+                (parameter, LEVELS.detection_sqrt_lambda / scored.information[(k, k)].max(0.0).sqrt())
+            })
             .filter(|(_, size)| size.is_finite())
             .min_by(|a, b| (a.1 / a.0.prior_sigma).total_cmp(&(b.1 / b.0.prior_sigma)));
         let entry = match smallest {
@@ -34,7 +35,7 @@ pub(crate) fn detectability(
                 (Blind { id: id.to_owned(), why: NOT_RESOLVED.to_owned(), smallest_detectable: None }, f64::INFINITY)
             }
             // A million times what would be large is rounding, not information.
-            Some((parameter, size)) if size < MAX_DETECTION_LIMIT_PRIOR_SIGMAS * parameter.prior_sigma => {
+            Some((parameter, size)) if size < SEARCH.max_detection_limit_prior_sigmas * parameter.prior_sigma => {
                 // A ratio has no unit in print.
                 let unit = if parameter.unit == "1" { String::new() } else { format!(" {}", parameter.unit) };
                 let why = if size > parameter.prior_sigma {

@@ -11,7 +11,7 @@ use crate::candidates::cause::{Basis, Cause};
 use crate::findings::finding::{Finding, of_causes, parameters, z};
 use crate::fits::augmented_model::AugmentedModel;
 use crate::fits::statistics::p_of_chi_square;
-use crate::settings::levels::SCAN_LEVEL;
+use crate::settings::LEVELS;
 
 /// The columns of a base fit that are a part of the extrinsics; none where these stay nominal.
 fn columns_of(base: &ModelFit<'_>, extrinsic: Extrinsic) -> Option<&'static [Column]> {
@@ -56,7 +56,7 @@ pub(crate) fn of_model(model: &AugmentedModel<'_>, without: &[String]) -> Vec<Fi
         let estimates: Vec<(f64, f64)> =
             values.iter().zip(&rows).map(|(value, row)| (*value, covariance[(*row, *row)].sqrt())).collect();
         let found = of_causes(vec![cause], p_value, parameters(&candidate, &estimates), Basis::Extrinsics);
-        (p_value < SCAN_LEVEL).then_some(Finding { z: z(chi_square, p_value), ..found })
+        (p_value < LEVELS.scan_level).then_some(Finding { z: z(chi_square, p_value), ..found })
     };
     mean_terms(&[]).into_iter().filter_map(of_candidate).collect()
 }

@@ -23,14 +23,7 @@ use crate::records::record_faults::Fault;
 use crate::records::stamp_errors::StampError;
 use crate::search::rivals::Name;
 use crate::search::selection::SearchResult;
-use crate::settings::carry_over::MIN_ESTABLISHED_PROBABILITY;
-use crate::settings::findings::{
-    LACK_OF_FIT_LEVEL, NONE_OF_CAUSES_ODDS, PART_OF_STRONGER_RATIO, PART_OF_STRONGER_RATIO_IF_FULL, UNCATALOGUED_PRIOR,
-};
-use crate::settings::levels::{
-    LOW_SIGNIFICANCE_SIGMAS, MIN_LOG_ODDS_MARGIN, MIN_QUANTILE_P_VALUE, MODEL_MISMATCH_FRACTION,
-};
-use crate::settings::records::MAX_WRONG_WHEELS_FACTOR;
+use crate::settings::{CARRY_OVER, FINDINGS, LEVELS, RECORDS};
 
 /// Something that the calibrated model gets wrong.
 #[derive(Debug, Clone, PartialEq)]
@@ -93,7 +86,7 @@ impl Finding {
     /// Whether the extended model has its term, which acts wherever the robot drives. Beside the data that it
     /// was found in, one of several causes, or an unknown one, is likely to predict worse than none.
     pub(crate) fn is_in_extended_model(&self) -> bool {
-        let established = self.probability >= MIN_ESTABLISHED_PROBABILITY && !self.has_unlisted();
+        let established = self.probability >= CARRY_OVER.min_established_probability && !self.has_unlisted();
         self.carry_over.as_ref().and_then(|of| of.carries_over).unwrap_or(established)
     }
 
@@ -142,12 +135,12 @@ fn trials(found: &SearchResult<'_>, candidate: &Candidate) -> usize {
 /// Whether an effect that a search found is of low significance.
 pub(crate) fn is_of_low_significance(found: &SearchResult<'_>, index: usize) -> bool {
     let (candidate, test) = (&found.model.candidates[index], &found.tests[index]);
-    z(test.statistic, sidak(test.p_value, trials(found, candidate))) < LOW_SIGNIFICANCE_SIGMAS
+    z(test.statistic, sidak(test.p_value, trials(found, candidate))) < LEVELS.low_significance_sigmas
 }
 
 /// The log of that probability over that of a catalogued cause.
 pub(crate) fn uncatalogued_log_odds() -> f64 {
-    (UNCATALOGUED_PRIOR / (1.0 - UNCATALOGUED_PRIOR)).ln()
+    (FINDINGS.uncatalogued_prior / (1.0 - FINDINGS.uncatalogued_prior)).ln()
 }
 
 fn of_candidate(candidate: &Candidate, names: &[Name], test: &Test, trials: usize) -> Finding {
@@ -163,7 +156,7 @@ fn of_candidate(candidate: &Candidate, names: &[Name], test: &Test, trials: usiz
     }
     Finding {
         causes,
-        probability: (1.0 - UNCATALOGUED_PRIOR) * if total_odds > 0.0 { 1.0 / total_odds } else { 1.0 },
+        probability: (1.0 - FINDINGS.uncatalogued_prior) * if total_odds > 0.0 { 1.0 / total_odds } else { 1.0 },
         z: z(test.statistic, p_value),
         p_value,
         parameters: parameters(candidate, &test.estimates),
@@ -178,7 +171,7 @@ fn of_candidate(candidate: &Candidate, names: &[Name], test: &Test, trials: usiz
 /// The standard normal quantile of a probability; where that is below what a double holds, from the
 /// statistic itself.
 pub(crate) fn z(statistic: f64, p_value: f64) -> f64 {
-    if p_value > MIN_QUANTILE_P_VALUE { z_of_p(p_value) } else { statistic.sqrt() }
+    if p_value > LEVELS.min_quantile_p_value { z_of_p(p_value) } else { statistic.sqrt() }
 }
 
 /// The finding of a sparse term at the end of a model's candidates.
@@ -239,13 +232,13 @@ pub(crate) fn beside_unlisted(findings: &mut [Finding], odds: f64) {
 /// its hypothesis by no more than 1/(−e p ln p) (Sellke, Bayarri & Berger 2001).
 fn uncatalogued_odds(p_value: f64) -> f64 {
     let bayes_factor_bound = (-std::f64::consts::E * p_value * p_value.max(f64::MIN_POSITIVE).ln()).recip();
-    (bayes_factor_bound * UNCATALOGUED_PRIOR / (1.0 - UNCATALOGUED_PRIOR)).min(1.0)
+    (bayes_factor_bound * FINDINGS.uncatalogued_prior / (1.0 - FINDINGS.uncatalogued_prior)).min(1.0)
 }
 
 /// Doubts an effect whose form is off significantly, and by more than is known of it.
 pub(crate) fn or_of_other_form(finding: &mut Finding, deviation: FormDeviation, has_exact_form: bool) {
     let FormDeviation { share, p_value, by } = deviation;
-    if p_value < LACK_OF_FIT_LEVEL && (has_exact_form || share > MODEL_MISMATCH_FRACTION) {
+    if p_value < FINDINGS.lack_of_fit_level && (has_exact_form || share > LEVELS.model_mismatch_fraction) {
         finding.or_unlisted(uncatalogued_odds(p_value), Doubt::OtherForm(by));
     }
 }
@@ -253,12 +246,12 @@ pub(crate) fn or_of_other_form(finding: &mut Finding, deviation: FormDeviation, 
 /// Doubts effects that no other doubt is on, where the score of an uncatalogued term is significant beside
 /// them by more than the error of their form.
 pub(crate) fn or_incomplete(findings: &mut [Finding], (score, p_value): (f64, f64)) {
-    if p_value >= LACK_OF_FIT_LEVEL {
+    if p_value >= FINDINGS.lack_of_fit_level {
         return;
     }
     let odds = uncatalogued_odds(p_value);
     let is_incomplete =
-        |finding: &&mut Finding| finding.is_certain() && score > MODEL_MISMATCH_FRACTION * finding.z.powi(2);
+        |finding: &&mut Finding| finding.is_certain() && score > LEVELS.model_mismatch_fraction * finding.z.powi(2);
     for finding in findings.iter_mut().filter(is_incomplete) {
         finding.or_unlisted(odds, Doubt::Incomplete);
     }
@@ -266,8 +259,10 @@ pub(crate) fn or_incomplete(findings: &mut [Finding], (score, p_value): (f64, f6
 
 /// Doubts effects of low significance that no other doubt is on.
 pub(crate) fn or_of_low_significance(findings: &mut [Finding]) {
-    for finding in findings.iter_mut().filter(|finding| finding.is_certain() && finding.z < LOW_SIGNIFICANCE_SIGMAS) {
-        finding.or_unlisted(NONE_OF_CAUSES_ODDS, Doubt::LowSignificance);
+    for finding in
+        findings.iter_mut().filter(|finding| finding.is_certain() && finding.z < LEVELS.low_significance_sigmas)
+    {
+        finding.or_unlisted(FINDINGS.none_of_causes_odds, Doubt::LowSignificance);
     }
 }
 
@@ -281,12 +276,12 @@ pub(crate) fn doubt(findings: &mut [Finding], full: bool) {
     let scatter = strongest(findings, |finding| has_sign(finding.first().id(), Sign::ScatterWithTurn));
     for finding in findings.iter_mut().filter(|finding| !finding.is_unlisted()) {
         let is_mean = finding.is_mean();
-        let limit = unlisted * if full && is_mean { PART_OF_STRONGER_RATIO_IF_FULL } else { 1.0 };
-        if is_mean && (finding.z < limit || PART_OF_STRONGER_RATIO * finding.z < scatter) {
+        let limit = unlisted * if full && is_mean { FINDINGS.part_of_stronger_ratio_if_full } else { 1.0 };
+        if is_mean && (finding.z < limit || FINDINGS.part_of_stronger_ratio * finding.z < scatter) {
             finding.causes.retain(|cause| !cause.is_unlisted());
             finding.causes.insert(0, Cause::Unknown);
             finding.doubts.push(Doubt::ProbablyPartOfUnlisted);
-        } else if finding.z < PART_OF_STRONGER_RATIO * limit {
+        } else if finding.z < FINDINGS.part_of_stronger_ratio * limit {
             finding.or_unlisted(1.0, Doubt::PartOfUnlisted);
         }
     }
@@ -316,7 +311,7 @@ pub(crate) fn of_spans(spans: Option<&TestResult>) -> Option<Finding> {
 pub(crate) fn of_wrong_wheels(factor: f64, without: &[String]) -> Option<Finding> {
     let factor_of = |id: &'static str| effects::description(id)?.record_fault.counts_factor.map(|size| (id, size));
     let (id, size) = CATALOGUE.iter().copied().find_map(factor_of)?;
-    let is_nameable = factor.ln().abs() <= MAX_WRONG_WHEELS_FACTOR.ln() && without.iter().all(|out| out != id);
+    let is_nameable = factor.ln().abs() <= RECORDS.max_wrong_wheels_factor.ln() && without.iter().all(|out| out != id);
     let cause = if is_nameable { Cause::Effect(id) } else { Cause::Unknown };
     // Logged over true counts: wheels that count twice as often seem half as large.
     let value = Value { value: factor.recip(), sigma: None, unit: "1".to_owned() };
@@ -441,7 +436,8 @@ pub(crate) fn of_causes(
     if causes.is_empty() {
         causes.push(Cause::Unknown);
     }
-    let probability = if causes == [Cause::Unknown] { 1.0 } else { (1.0 - UNCATALOGUED_PRIOR) / causes.len() as f64 };
+    let probability =
+        if causes == [Cause::Unknown] { 1.0 } else { (1.0 - FINDINGS.uncatalogued_prior) / causes.len() as f64 };
     Finding {
         causes,
         probability,
@@ -470,13 +466,14 @@ pub(crate) fn of_likely_scatter(
     let best = likely.first().map_or(0.0, |(_, log)| *log);
     let total_odds: f64 = likely.iter().map(|(_, log)| (log - best).exp()).sum();
     let named = if or_unlisted { likely.len() as f64 / (likely.len() + 1) as f64 } else { 1.0 };
-    likely.retain(|(_, log)| *log > best.max(any) - MIN_LOG_ODDS_MARGIN);
+    likely.retain(|(_, log)| *log > best.max(any) - LEVELS.min_log_odds_margin);
     let mut causes: Vec<Cause> = likely.into_iter().map(|(id, _)| Cause::Effect(id)).collect();
     if or_unlisted {
         causes.push(Cause::Unknown);
     }
     let finding = of_causes(causes, p_value, BTreeMap::new(), basis);
-    let probability = if finding.is_unlisted() { 1.0 } else { (1.0 - UNCATALOGUED_PRIOR) * named / total_odds };
+    let probability =
+        if finding.is_unlisted() { 1.0 } else { (1.0 - FINDINGS.uncatalogued_prior) * named / total_odds };
     Finding { probability, ..finding }
 }
 

@@ -2,7 +2,7 @@
 
 use effects::GeometryRatio;
 
-use crate::settings::records::MAX_SKID_STEERED_SEPARATION;
+use crate::settings::RECORDS;
 
 /// A ratio of the geometry that is farther from its stated value than any robot of that description.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,7 +22,7 @@ impl GeometryDeviation {
     /// Whether a robot whose wheels skid in turns has it: its effective separation is larger than the
     /// wheels'.
     pub(crate) fn is_of_skid_steering(&self) -> bool {
-        self.of == GeometryRatio::Separation && (1.0..=MAX_SKID_STEERED_SEPARATION).contains(&self.ratio)
+        self.of == GeometryRatio::Separation && (1.0..=RECORDS.max_skid_steered_separation).contains(&self.ratio)
     }
 }
 

@@ -6,9 +6,7 @@ use estimation::{Column, ModelFit};
 use crate::candidates::candidate::terms;
 use crate::findings::geometry_deviation::GeometryDeviation;
 use crate::fits::augmented_model::AugmentedModel;
-use crate::settings::records::{
-    MAX_SEPARATION_DEVIATION, MAX_WHEEL_DEVIATION_SIGMAS, MIN_DEVIATION_SIGMAS, WHEEL_PRIOR_SIGMA,
-};
+use crate::settings::RECORDS;
 
 /// The deviations of the base fit that are too large and certain, and that the effects found do not take
 /// back.
@@ -38,14 +36,14 @@ fn geometry_deviations(model: &AugmentedModel<'_>) -> Vec<GeometryDeviation> {
         let variance: f64 =
             pairs().filter_map(|(i, j)| Some(weights[i] * weights[j] * covariance[(at[i]?, at[j]?)])).sum();
         let (ratio, sigma) = (log.exp(), variance.max(0.0).sqrt());
-        let is_large = log.abs() > limit.ln_1p() && log.abs() > MIN_DEVIATION_SIGMAS * sigma;
+        let is_large = log.abs() > limit.ln_1p() && log.abs() > RECORDS.min_deviation_sigmas * sigma;
         is_large.then_some(GeometryDeviation { of, ratio, sigma: ratio * sigma })
     };
-    let wheels = MAX_WHEEL_DEVIATION_SIGMAS * WHEEL_PRIOR_SIGMA;
+    let wheels = RECORDS.max_wheel_deviation_sigmas * RECORDS.wheel_prior_sigma;
     [
         (GeometryRatio::Wheels, [0.5, 0.5, 0.0], wheels),
         (GeometryRatio::RightOverLeft, [-1.0, 1.0, 0.0], wheels),
-        (GeometryRatio::Separation, [0.0, 0.0, 1.0], MAX_SEPARATION_DEVIATION),
+        (GeometryRatio::Separation, [0.0, 0.0, 1.0], RECORDS.max_separation_deviation),
     ]
     .into_iter()
     .filter_map(deviation)
@@ -56,7 +54,7 @@ fn geometry_deviations(model: &AugmentedModel<'_>) -> Vec<GeometryDeviation> {
 /// off than they are without it: with one of which wheels and effect are determined together alone, as a loss
 /// per second at a single speed, neither is.
 pub(crate) fn keeps_wheels(without: &ModelFit<'_>, with: &ModelFit<'_>) -> bool {
-    let limit = (MAX_WHEEL_DEVIATION_SIGMAS * WHEEL_PRIOR_SIGMA).ln_1p();
+    let limit = (RECORDS.max_wheel_deviation_sigmas * RECORDS.wheel_prior_sigma).ln_1p();
     let off = |fit: &ModelFit<'_>| {
         let ratio = fit.solution.model.m_per_rad.zip_with(fit.nominal.m_per_rad, |found, nominal| found / nominal);
         ratio.map(|ratio| ratio.ln().abs())

@@ -13,7 +13,7 @@ use crate::fits::augmented_model::AugmentedModel;
 use crate::fits::scan::{Scored, scan};
 use crate::fits::wald::{Test, wald_test};
 use crate::search::sparse_terms::{best_first, library};
-use crate::settings::findings::LACK_OF_FIT_LEVEL;
+use crate::settings::FINDINGS;
 
 /// What a form may be off with: the speeds, and the time.
 const COVARIATES: [Covariate; 3] = [Covariate::AbsSpeed, Covariate::AbsYawRate, Covariate::RunTime];
@@ -52,7 +52,7 @@ pub(crate) fn lack_of_fit(base: &ModelFit<'_>, model: &AugmentedModel<'_>, effec
     let mut scored = scan(&model.fit, &model.candidates, &candidates);
     let of_forms = scored.split_off(products);
     let first = |scored| {
-        let (scored, p_value) = best_first(model, scored, (LACK_OF_FIT_LEVEL, LACK_OF_FIT_LEVEL))?;
+        let (scored, p_value) = best_first(model, scored, (FINDINGS.lack_of_fit_level, FINDINGS.lack_of_fit_level))?;
         Some((scored.into_iter().next()?, p_value))
     };
     let of_form = |((index, test), scored): (&(usize, Test), &[Scored])| {

@@ -10,7 +10,7 @@ use dataset::Dataset;
 use crate::document::Value;
 use crate::findings::finding::Finding;
 use crate::records::stamp_errors::StampError;
-use crate::settings::records::{MAX_MEAN_LATENESS_RATIO, MAX_RESTORED_LATENESS_RATIO};
+use crate::settings::RECORDS;
 
 /// Gives what the instrument's clock seems to be off by to the error of the stamps, where that may be all of
 /// it. `recorded` are the datasets with their stamps as they were recorded.
@@ -25,9 +25,10 @@ pub(crate) fn join_clock(findings: &mut Vec<Finding>, stamps: Option<&StampError
         return;
     };
     let early_s = -offset.value;
-    let least = if stamps.is_some_and(|stamps| stamps.is_undone_roughly) { -MAX_RESTORED_LATENESS_RATIO } else { 0.0 };
+    let least =
+        if stamps.is_some_and(|stamps| stamps.is_undone_roughly) { -RECORDS.max_restored_lateness_ratio } else { 0.0 };
     let lateness_s = lateness_s(recorded);
-    if (least * lateness_s..=MAX_MEAN_LATENESS_RATIO * lateness_s).contains(&early_s) {
+    if (least * lateness_s..=RECORDS.max_mean_lateness_ratio * lateness_s).contains(&early_s) {
         findings[of_stamps].parameters.insert("late_s".to_owned(), Value { value: early_s, ..offset });
         findings.remove(clock);
     }

@@ -27,11 +27,7 @@ use crate::fits::augmented_model::{AugmentedModel, cost, count};
 use crate::fits::null_distribution::{NullDistribution, among_simulated};
 use crate::fits::statistics::{p_of_chi_square, p_of_z};
 use crate::search::mean_structure::MeanStructure;
-use crate::settings::levels::TURN_SCATTER_LEVEL;
-use crate::settings::residuals::{
-    DEPENDENCE_BEYOND_TAILS_LEVEL, ISOLATED_TO_PERSISTENT_RATIO, MAX_OUTLIER_FRACTION, NOISE_EFFECT_LEVEL,
-    NORMAL_KURTOSIS,
-};
+use crate::settings::{LEVELS, RESIDUALS};
 
 /// Scatter that failed checks show, and the datasets as they were recorded.
 pub(crate) fn scatter(structure: &MeanStructure<'_>, recorded: &[Dataset], without_ids: &[String]) -> Vec<Finding> {
@@ -39,7 +35,7 @@ pub(crate) fn scatter(structure: &MeanStructure<'_>, recorded: &[Dataset], witho
     let outliers = structure.checked.outliers;
     let tests = &structure.checked.checks;
     let rejected = outliers.isolated + outliers.persistent;
-    if rejected as f64 > MAX_OUTLIER_FRACTION * (outliers.measurements + rejected) as f64 {
+    if rejected as f64 > RESIDUALS.max_outlier_fraction * (outliers.measurements + rejected) as f64 {
         // The model does not follow the robot at all: that has no name.
         return findings;
     }
@@ -56,13 +52,13 @@ pub(crate) fn scatter(structure: &MeanStructure<'_>, recorded: &[Dataset], witho
     let p_of_dependence = p_of_dependence.map(|test| test.p_value).fold(1.0, f64::min);
     let tails = tests.iter().filter(|test| matches!(test.check, Check::Tails(_) | Check::Outliers));
     let tails = tails.map(|test| test.p_value).fold(1.0, f64::min);
-    let is_dependent = p_of_dependence < tails.max(DEPENDENCE_BEYOND_TAILS_LEVEL);
+    let is_dependent = p_of_dependence < tails.max(RESIDUALS.dependence_beyond_tails_level);
     // After the end of a run nothing follows that could be back.
     let has_successors =
         structure.base.selections.first().is_some_and(|taken| taken.mean_measurements(&structure.base.records) >= 2.0);
     let are_isolated = has_successors
-        && outliers.p_value < NOISE_EFFECT_LEVEL
-        && outliers.isolated >= ISOLATED_TO_PERSISTENT_RATIO * outliers.persistent;
+        && outliers.p_value < RESIDUALS.noise_effect_level
+        && outliers.isolated >= RESIDUALS.isolated_to_persistent_ratio * outliers.persistent;
     if Rule::IsolatedErrors.applies(are_isolated) {
         let share = outliers.isolated as f64 / (outliers.measurements + rejected) as f64;
         let value = Value { value: share, sigma: None, unit: "1".to_owned() };
@@ -88,11 +84,12 @@ pub(crate) fn scatter(structure: &MeanStructure<'_>, recorded: &[Dataset], witho
         let tails = [(Component::Heading, 2, Sign::HeadingJumps), (Component::Along, 0, Sign::DistanceJumps)];
         let test = |component: Component| tests.iter().find(|test| test.check == Check::Tails(component));
         let kurtosis = |component: Component| test(component).map_or(0.0, |test| test.statistic);
-        let has_outliers = outliers.p_value < NOISE_EFFECT_LEVEL && (outliers.persistent > 0 || !has_successors);
+        let has_outliers =
+            outliers.p_value < RESIDUALS.noise_effect_level && (outliers.persistent > 0 || !has_successors);
         let heaviest = tails.into_iter().max_by(|a, b| kurtosis(a.0).total_cmp(&kurtosis(b.0)));
         let jump = heaviest.and_then(|(component, number, sign)| {
             // Tails that are lighter than normal ones are no large errors.
-            let fails = test(component).filter(|test| !test.passes && test.statistic > NORMAL_KURTOSIS);
+            let fails = test(component).filter(|test| !test.passes && test.statistic > RESIDUALS.normal_kurtosis);
             let p_value = fails.map(|test| test.p_value).or(has_outliers.then_some(outliers.p_value))?;
             Some((p_value, residual_persistence(&structure.found.model, number), sign))
         });
@@ -154,7 +151,7 @@ fn with_sign(sign: Sign, without_ids: &[String]) -> Vec<Cause> {
 fn of_turns(structure: &MeanStructure<'_>, without_ids: &[String]) -> Option<Finding> {
     let model = structure.model();
     let p_value = p_of_turn_scatter(model)?;
-    if p_value >= TURN_SCATTER_LEVEL {
+    if p_value >= LEVELS.turn_scatter_level {
         return None;
     }
     let sigma = model.fit.solution.noise.sigma(NoiseComponent::Turn);
@@ -174,7 +171,7 @@ fn of_turns(structure: &MeanStructure<'_>, without_ids: &[String]) -> Option<Fin
 fn p_of_turn_scatter(model: &AugmentedModel<'_>) -> Option<f64> {
     let differ = |model: &AugmentedModel<'_>| [differs_from_run_to_run(model), differs_from_turn_to_turn(model)];
     let mut p_values = differ(model).to_vec();
-    let may_be_found = p_values.iter().any(|p_value| *p_value < TURN_SCATTER_LEVEL);
+    let may_be_found = p_values.iter().any(|p_value| *p_value < LEVELS.turn_scatter_level);
     if let Some(null) = NullDistribution::of(model).filter(|_| Rule::TurnScatterAmongSimulated.applies(may_be_found)) {
         let simulated =
             null.resimulated(|fit| differ(&AugmentedModel { fit: fit.clone(), candidates: model.candidates.clone() }));

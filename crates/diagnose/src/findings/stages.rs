@@ -26,8 +26,7 @@ use crate::records::stamp_errors::{StampError, have_uncertain_rows};
 use crate::records::unknown_motion::Anomaly;
 use crate::search::mean_structure::MeanStructure;
 use crate::search::sparse_terms::UncataloguedTerms;
-use crate::settings::findings::DEPENDENCE_BEYOND_NOISE_LEVEL;
-use crate::settings::levels::MAX_EFFECTS;
+use crate::settings::{FINDINGS, LEVELS};
 
 fn is_scatter(finding: &Finding) -> bool {
     match effects::hypothesis(finding.first().id()) {
@@ -233,7 +232,7 @@ fn faults_of_the_log(results: &StageResults<'_, '_>, mut findings: Vec<Finding>)
 /// on something too plainly.
 fn failed_checks(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
     let StageResults { structure, .. } = results;
-    let plainly = |test: &TestResult| test.shows_dependence() && test.p_value < DEPENDENCE_BEYOND_NOISE_LEVEL;
+    let plainly = |test: &TestResult| test.shows_dependence() && test.p_value < FINDINGS.dependence_beyond_noise_level;
     let scatters = findings.iter().any(is_scatter) && !structure.checked.checks.iter().any(plainly);
     let is_reported = structure.unlisted.is_some() || findings.iter().any(Finding::is_unlisted);
     if !(results.restored() || scatters || is_reported) {
@@ -257,7 +256,7 @@ fn without_errors_of_form(results: &StageResults<'_, '_>, mut findings: Vec<Find
 }
 
 fn doubt_parts_of_stronger_findings(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
-    let full = results.structure.found.model.candidates.len() >= MAX_EFFECTS;
+    let full = results.structure.found.model.candidates.len() >= LEVELS.max_effects;
     let before = findings.clone();
     finding::doubt(&mut findings[results.faults.len()..], full);
     Rule::PartOfStronger.changes(before, findings)

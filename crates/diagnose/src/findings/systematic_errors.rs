@@ -16,7 +16,7 @@ use crate::document::Value;
 use crate::findings::finding::Finding;
 use crate::fits::augmented_model::{AugmentedModel, refit};
 use crate::fits::statistics::p_of_chi_square;
-use crate::settings::levels::{SCAN_LEVEL, SPARSE_TERM_LEVEL};
+use crate::settings::LEVELS;
 
 /// Leaves out what systematic errors explain: terms of `model` that are not significant beside them, and
 /// signs of errors of the instrument beside a map or rates that are rounded by more. Sizes of the others get
@@ -30,8 +30,8 @@ pub(crate) fn without_systematic_errors(findings: &mut Vec<Finding>, base: &Mode
             Basis::FailedTests(_) | Basis::Autocorrelated(..) => {
                 return base.records.map.is_none() && !base.rates_are_coarser_than_measurements();
             }
-            Basis::Products(trials) => (trials, SPARSE_TERM_LEVEL),
-            _ => (CATALOGUE.len(), SCAN_LEVEL),
+            Basis::Products(trials) => (trials, LEVELS.sparse_term_level),
+            _ => (CATALOGUE.len(), LEVELS.scan_level),
         };
         let Some(candidate) = finding.term.map(|term| &model.candidates[term]) else { return true };
         let Some((p_value, covariance)) = beside_errors(base, candidate) else { return false };

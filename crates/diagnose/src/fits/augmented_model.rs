@@ -8,7 +8,7 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 use crate::candidates::candidate::{Candidate, terms};
-use crate::settings::search::{MAX_FITS_AT_A_TIME, MIN_TAKEN_FRACTION, OUTLIER_COST};
+use crate::settings::SEARCH;
 
 /// A fit with effects.
 #[derive(Debug, Clone)]
@@ -49,7 +49,7 @@ pub(crate) fn cost(fit: &ModelFit<'_>, count: f64) -> f64 {
 /// Cost of the innovations that are missing to a count: each costs as much as an outlier at the gate, and
 /// has the mean variance of the others.
 pub(crate) fn left_out_cost(equations: &NormalEquations, count: f64) -> f64 {
-    (count - equations.count).max(0.0) * (OUTLIER_COST + 0.5 * equations.log_det / equations.count.max(1.0))
+    (count - equations.count).max(0.0) * (SEARCH.outlier_cost + 0.5 * equations.log_det / equations.count.max(1.0))
 }
 
 pub(crate) fn count(fit: &ModelFit<'_>) -> f64 {
@@ -73,7 +73,7 @@ pub(crate) fn refit<'a>(
     }
     let takes_enough = |fit: &ModelFit<'_>| {
         fit.solution.model.term_values.iter().all(|size| size.is_finite())
-            && count(fit) > MIN_TAKEN_FRACTION * count(&from.fit)
+            && count(fit) > SEARCH.min_taken_fraction * count(&from.fit)
     };
     let from_here = from.fit.extended_from(estimates.clone(), &mut terms(&candidates)).ok().filter(takes_enough);
     let from_here = match from_here {
@@ -96,7 +96,7 @@ pub(crate) fn refit_each<'a, T: Sync>(
     refit: impl Fn(&T) -> Option<AugmentedModel<'a>> + Sync,
 ) -> Vec<AugmentedModel<'a>> {
     let few = |few: &[T]| few.par_iter().filter_map(&refit).collect::<Vec<_>>();
-    of.chunks(MAX_FITS_AT_A_TIME).flat_map(few).collect()
+    of.chunks(SEARCH.max_fits_at_a_time).flat_map(few).collect()
 }
 
 /// A model's candidates but one.

@@ -7,12 +7,12 @@ use estimation::total;
 use nalgebra::{DMatrix, DVector};
 
 use crate::fits::augmented_model::AugmentedModel;
-use crate::settings::search::MAX_CANCELLATION;
+use crate::settings::SEARCH;
 
 /// Whether effects of a model only cancel each other: each given the other is significant, and on any driving
 /// but that which was recorded their difference is another.
 pub(crate) fn effects_cancel(model: &AugmentedModel<'_>) -> bool {
-    cancellation(model) > MAX_CANCELLATION
+    cancellation(model) > SEARCH.max_cancellation
 }
 
 /// How much more an effect would explain by itself, at the size that it has beside others, than it does

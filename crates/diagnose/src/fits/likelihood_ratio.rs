@@ -13,7 +13,7 @@ use crate::fits::fit_cache::FitCache;
 use crate::fits::statistics::{p_of_ratio, sidak};
 use crate::fits::wald::wald_test;
 use crate::search::ranking::Entry;
-use crate::settings::search::{MAX_REFITTED_BY_SCORE, REFITTED_LEVEL};
+use crate::settings::SEARCH;
 
 /// Of the entries whose score is not significant by itself, the one that is most significant once refitted,
 /// if it is at a family-wise level over so many tests.
@@ -23,9 +23,9 @@ pub(crate) fn significant_once_refitted<'e, 'a>(
     entries: &'e [Entry],
     (tests, level): (f64, f64),
 ) -> Option<&'e Entry> {
-    let mut ranked: Vec<&Entry> = entries.iter().filter(|entry| entry.p_value <= REFITTED_LEVEL).collect();
+    let mut ranked: Vec<&Entry> = entries.iter().filter(|entry| entry.p_value <= SEARCH.refitted_level).collect();
     ranked.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
-    ranked.truncate(MAX_REFITTED_BY_SCORE);
+    ranked.truncate(SEARCH.max_refitted_by_score);
     let p_value_of = |entry: &'e Entry| {
         let mut candidates = model.candidates.clone();
         candidates.push(entry.scored.candidate.clone());

@@ -7,11 +7,11 @@ use crate::candidates::candidate::terms;
 use crate::fits::augmented_model::{AugmentedModel, cost, count};
 use crate::fits::scan::log_occam_factor;
 use crate::fits::wald::wald_test;
-use crate::settings::levels::{MIN_LOG_ODDS_MARGIN, MODEL_MISMATCH_FRACTION, NORMAL_QUANTILE_ONE_SIDED_95};
+use crate::settings::LEVELS;
 
 /// Largest difference in log odds from the best cause at which a cause is not discriminated.
 pub(crate) fn log_odds_margin(best: f64) -> f64 {
-    MIN_LOG_ODDS_MARGIN.max(MODEL_MISMATCH_FRACTION * best)
+    LEVELS.min_log_odds_margin.max(LEVELS.model_mismatch_fraction * best)
 }
 
 /// The same of two models whose log likelihoods differ from unit to unit, runs or blocks where these are
@@ -26,7 +26,7 @@ pub(crate) fn margin_over_units(best: f64, one: &AugmentedModel<'_>, other: &Aug
     let are_paired = one.len() == other.len() && one.iter().zip(&other).all(|(one, other)| one.0 == other.0);
     let differences: Vec<f64> = one.iter().zip(&other).map(|((_, one), (_, other))| one - other).collect();
     let sigma = if are_paired { sigma_of_sum(&differences) } else { 0.0 };
-    log_odds_margin(best).max(NORMAL_QUANTILE_ONE_SIDED_95 * sigma)
+    log_odds_margin(best).max(LEVELS.normal_quantile_one_sided_95 * sigma)
 }
 
 /// Standard error of the sum of independent values; 0 of a single one, which does not scatter.
@@ -45,7 +45,7 @@ pub(crate) fn relative_odds(log_odds: f64, best: f64) -> f64 {
 
 /// Odds for a difference of log odds of which so much is no difference.
 pub(crate) fn odds_within(difference: f64, margin: f64) -> f64 {
-    (difference * MIN_LOG_ODDS_MARGIN / margin).exp()
+    (difference * LEVELS.min_log_odds_margin / margin).exp()
 }
 
 /// Log odds whose difference from the best counts as a share of so much scatter, where that is more than the
@@ -68,12 +68,12 @@ pub(crate) fn log_bayes_factor(base: &ModelFit<'_>, model: &AugmentedModel<'_>) 
 pub(crate) fn form_error_statistic(model: &AugmentedModel<'_>) -> f64 {
     let inexact = model.candidates.iter().enumerate().filter(|(_, candidate)| !candidate.has_exact_form());
     let statistics = inexact.filter_map(|(index, _)| wald_test(model, index)).map(|(test, _)| test.statistic);
-    MODEL_MISMATCH_FRACTION * statistics.fold(0.0, f64::max)
+    LEVELS.model_mismatch_fraction * statistics.fold(0.0, f64::max)
 }
 
 /// Difference in log odds from a model at which one of fewer effects is not discriminated from it.
 pub(crate) fn log_odds_margin_of(model: &AugmentedModel<'_>) -> f64 {
-    MIN_LOG_ODDS_MARGIN.max(0.5 * form_error_statistic(model))
+    LEVELS.min_log_odds_margin.max(0.5 * form_error_statistic(model))
 }
 
 /// Log Occam factor: how well sizes agree with their prior, and what their freedom costs.

@@ -13,7 +13,7 @@ use crate::candidates::candidate::{Candidate, terms};
 use crate::fits::augmented_model::AugmentedModel;
 use crate::fits::scan::{detectable_statistic, scan_parts_of};
 use crate::fits::statistics::{p_of_upper_student, z_of_upper};
-use crate::settings::residuals::{LOWEST_SIMULATED_Z, RESIMULATIONS};
+use crate::settings::RESIDUALS;
 
 /// A model whose tests depend on the rounding of counts.
 pub(crate) struct NullDistribution<'m, 'a> {
@@ -65,7 +65,7 @@ impl<'m, 'a> NullDistribution<'m, 'a> {
 
 /// What each simulation gives, by its number.
 fn of_each<T: Send>(of: impl Fn(u64) -> T + Sync) -> Vec<T> {
-    (1..=RESIMULATIONS).into_par_iter().map(&of).collect()
+    (1..=RESIDUALS.resimulations).into_par_iter().map(&of).collect()
 }
 
 /// A score statistic over what it is by formula, on average.
@@ -107,7 +107,7 @@ pub(crate) fn beyond_simulated((coefficient, sigmas): (f64, f64), simulated: &[(
 /// and 1, by formula.
 fn judged(z: f64, simulated: &[f64]) -> f64 {
     let count = simulated.len() as f64;
-    let simulated: Vec<f64> = simulated.iter().map(|z| z.max(LOWEST_SIMULATED_Z)).collect();
+    let simulated: Vec<f64> = simulated.iter().map(|z| z.max(RESIDUALS.lowest_simulated_z)).collect();
     let mean = simulated.iter().sum::<f64>() / count;
     let variance = simulated.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / (count - 1.0);
     let (mean, sd) = (mean.max(0.0), variance.sqrt().max(1.0));

@@ -9,8 +9,7 @@
 use estimation::ModelFit;
 
 use crate::fits::augmented_model::{AugmentedModel, cost, count, refit};
-use crate::settings::levels::NORMAL_QUANTILE_95;
-use crate::settings::search::{MIN_PROFILE_STEP_RATIO, PROFILE_ITERATIONS, PROFILE_STEP_SIGMAS};
+use crate::settings::{LEVELS, SEARCH};
 
 /// One value of the parameter's logarithm, with the fit there.
 struct Point<'a> {
@@ -41,7 +40,7 @@ pub(crate) fn fit_variant<'a>(base: &ModelFit<'a>, model: &mut AugmentedModel<'a
     };
     let mut best = Point { x: fixed.ln(), model: model.clone() };
     let mut sigma = 0.0;
-    for _ in 0..PROFILE_ITERATIONS {
+    for _ in 0..SEARCH.profile_iterations {
         let middle = best.x.clamp(low_end + 0.5 * step, high_end - 0.5 * step);
         if middle != best.x {
             let Some(point) = at(middle) else { return none };
@@ -61,13 +60,13 @@ pub(crate) fn fit_variant<'a>(base: &ModelFit<'a>, model: &mut AugmentedModel<'a
             let most = count(&best.model.fit).max(count(&point.model.fit));
             if cost(&point.model.fit, most) < cost(&best.model.fit, most) { point } else { best }
         });
-        step = (PROFILE_STEP_SIGMAS * sigma).clamp(MIN_PROFILE_STEP_RATIO * step, step);
+        step = (SEARCH.profile_step_sigmas * sigma).clamp(SEARCH.min_profile_step_ratio * step, step);
     }
-    let ends = [best.x - NORMAL_QUANTILE_95 * sigma, best.x + NORMAL_QUANTILE_95 * sigma].map(at);
+    let ends = [best.x - LEVELS.normal_quantile_95 * sigma, best.x + LEVELS.normal_quantile_95 * sigma].map(at);
     let size = |point: &Point<'_>, k: usize| point.model.fit.solution.model.term_values[first + k];
     let extra_sigma = |k: usize| {
         let moved = ends.iter().flatten().map(|end| (size(end, k) - size(&best, k)).abs());
-        moved.fold(0.0, f64::max) / NORMAL_QUANTILE_95
+        moved.fold(0.0, f64::max) / LEVELS.normal_quantile_95
     };
     let extra_sigma = (0..parameters).map(extra_sigma).collect();
     *model = best.model;

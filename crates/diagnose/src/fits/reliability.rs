@@ -10,7 +10,7 @@ use nalgebra::DMatrix;
 
 use crate::candidates::candidate::Candidate;
 use crate::fits::scan::{Scored, prior_scaled, scan_parts_of};
-use crate::settings::search::{MIN_DETECTABLE_SIGMAS, MIN_RELIABILITY};
+use crate::settings::SEARCH;
 
 /// Which of candidates that were tested beside a fit's own the encoders do not resolve. Of all measurements:
 /// the motion by which an effect shows is in those that it makes outliers.
@@ -23,7 +23,7 @@ pub(crate) fn unresolved(fit: &ModelFit<'_>, chosen: &[Candidate], scored: &[Sco
     let own = open.as_ref().map_or_else(|| detectable.iter().map(|of| of.information.clone()).collect(), informations);
     let with_noise = informations(&noisier);
     let is_unresolved = |(scored, (own, noisier)): &(&Scored, (DMatrix<f64>, DMatrix<f64>))| {
-        reliability(&scored.parameters, own, noisier) < MIN_RELIABILITY
+        reliability(&scored.parameters, own, noisier) < SEARCH.min_reliability
     };
     let of = detectable.into_iter().zip(own.into_iter().zip(with_noise)).filter(is_unresolved);
     of.map(|(scored, _)| scored.candidate.clone()).collect()
@@ -36,7 +36,7 @@ fn reliability(parameters: &[TermParameter], own: &DMatrix<f64>, noisier: &DMatr
     let noisier = prior_scaled(noisier, parameters);
     let directions = eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter());
     let (own, with_noise) = directions
-        .filter(|(value, _)| **value >= MIN_DETECTABLE_SIGMAS * MIN_DETECTABLE_SIGMAS)
+        .filter(|(value, _)| **value >= SEARCH.min_detectable_sigmas * SEARCH.min_detectable_sigmas)
         .fold((0.0, 0.0), |(own, with_noise), (value, direction)| {
             (own + value, with_noise + direction.dot(&(&noisier * direction)))
         });

@@ -13,9 +13,7 @@ use rayon::prelude::*;
 
 use crate::candidates::candidate::{Candidate, batched_terms, terms};
 use crate::fits::statistics::p_of_score;
-use crate::settings::search::{
-    DECIMATION_STEP_S, MAX_COLUMNS_PER_PASS, MIN_COLUMN_SHARE, MIN_DETECTABLE_SIGMAS, PRIOR_SCALES,
-};
+use crate::settings::SEARCH;
 
 /// A candidate's test.
 #[derive(Debug, Clone)]
@@ -76,7 +74,7 @@ pub(crate) fn detectable_directions(
     let mut directions = principal(information, gradient, parameters);
     directions.retain(|(value, gradient)| {
         let is_number = value.is_finite() && (gradient * gradient).is_finite();
-        is_number && *value >= MIN_DETECTABLE_SIGMAS * MIN_DETECTABLE_SIGMAS
+        is_number && *value >= SEARCH.min_detectable_sigmas * SEARCH.min_detectable_sigmas
     });
     directions
 }
@@ -96,10 +94,10 @@ pub(crate) fn log_occam_factor(directions: &[(f64, f64)]) -> f64 {
         };
         directions.iter().map(of).sum()
     };
-    let all: Vec<f64> = (0..PRIOR_SCALES).map(at).collect();
+    let all: Vec<f64> = (0..SEARCH.prior_scales).map(at).collect();
     let most = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let sum: f64 = all.iter().map(|log_factor| (log_factor - most).exp()).sum();
-    most + (sum / f64::from(PRIOR_SCALES)).ln()
+    most + (sum / f64::from(SEARCH.prior_scales)).ln()
 }
 
 /// The statistic of candidates that are tested as a whole, over the directions that are detectable, and how
@@ -132,7 +130,7 @@ pub(crate) fn scan_parts_of<T: Send>(
     if parts.is_empty() {
         return Vec::new();
     }
-    let coarse = fit.decimated(&mut terms(chosen), DECIMATION_STEP_S);
+    let coarse = fit.decimated(&mut terms(chosen), SEARCH.decimation_step_s);
     let fit = coarse.as_ref().unwrap_or(fit);
     let of_pass = |parts: &&[&[Candidate]]| {
         let mut all = terms(chosen);
@@ -161,7 +159,7 @@ fn passes<'p, 'c>(parts: &'p [&'c [Candidate]]) -> Vec<&'p [&'c [Candidate]]> {
     for (number, part) in parts.iter().enumerate() {
         let own = columns_of(part);
         columns += own;
-        if columns > MAX_COLUMNS_PER_PASS && number > first {
+        if columns > SEARCH.max_columns_per_pass && number > first {
             passes.push(&parts[first..number]);
             (first, columns) = (number, own);
         }
@@ -189,7 +187,7 @@ fn score_test(
     // Noise is estimated by likelihood, without its degrees of freedom.
     let shrink = freedom / count.max(1.0);
     let mut directions = Vec::new();
-    if share.iter().any(|share| *share > MIN_COLUMN_SHARE) {
+    if share.iter().any(|share| *share > SEARCH.min_column_share) {
         directions = detectable_directions(information, gradient, &parameters);
     }
     let dimensions = directions.len();

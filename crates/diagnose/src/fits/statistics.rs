@@ -5,8 +5,7 @@
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Normal, StudentsT};
 use statrs::function::erf::erfc_inv;
 
-use crate::settings::levels::MAX_STUDENT_FREEDOM;
-use crate::settings::search::SHARE_BISECTIONS;
+use crate::settings::{LEVELS, SEARCH};
 
 /// p-value of a sum of `dimensions` squared normal variables over their variance, when the variance was
 /// estimated from about `freedom` values.
@@ -53,7 +52,7 @@ pub(crate) fn p_of_ratio(score: f64, ratio: f64, dimensions: usize, inflation: f
     // score/ratio = R²/−ln(1 − R²), which falls from 1 to 0.
     let quotient = |share: f64| share / -(-share).ln_1p();
     let (mut low, mut high) = (0.0, 1.0);
-    for _ in 0..SHARE_BISECTIONS {
+    for _ in 0..SEARCH.share_bisections {
         let share = 0.5 * (low + high);
         if quotient(share) * ratio > score { low = share } else { high = share }
     }
@@ -118,7 +117,7 @@ pub(crate) fn z_of_p(p: f64) -> f64 {
 
 /// Student's quantile for a two-sided interval of 95 %.
 pub(crate) fn student_95(freedom: f64) -> f64 {
-    StudentsT::new(0.0, 1.0, freedom.clamp(1.0, MAX_STUDENT_FREEDOM))
+    StudentsT::new(0.0, 1.0, freedom.clamp(1.0, LEVELS.max_student_freedom))
         .map_or(f64::INFINITY, |student| student.inverse_cdf(0.975))
 }
 

@@ -9,7 +9,7 @@ use crate::fits::augmented_model::AugmentedModel;
 use crate::fits::null_distribution::NullDistribution;
 use crate::fits::scan::{detectable_directions, freedom};
 use crate::fits::statistics::{p_of_statistic, p_of_student, student_95};
-use crate::settings::levels::{MIN_RUNS, NORMAL_QUANTILE_95};
+use crate::settings::LEVELS;
 
 /// A test of one candidate of a fitted model.
 #[derive(Debug, Clone)]
@@ -73,7 +73,7 @@ pub(crate) fn p_value_over(extended: &AugmentedModel<'_>, candidate: usize, infl
 pub(crate) fn cluster_robust_test(extended: &AugmentedModel<'_>, candidate: usize, level: f64) -> bool {
     // Fewer runs do not say how a size differs between them.
     let runs: Vec<_> = extended.fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).collect();
-    if runs.len() < MIN_RUNS {
+    if runs.len() < LEVELS.min_runs {
         return true;
     }
     let Some(equations) = total(&extended.fit.solution.pass.runs) else { return false };
@@ -99,7 +99,7 @@ fn cluster_robust_t(signal: f64, scores: &[f64]) -> f64 {
 /// leverage of a cluster).
 fn over_runs(extended: &AugmentedModel<'_>, candidate: usize) -> Option<Vec<f64>> {
     let runs: Vec<_> = extended.fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).collect();
-    if runs.len() < MIN_RUNS {
+    if runs.len() < LEVELS.min_runs {
         return None;
     }
     let equations = total(&extended.fit.solution.pass.runs)?;
@@ -114,7 +114,7 @@ fn over_runs(extended: &AugmentedModel<'_>, candidate: usize) -> Option<Vec<f64>
     let n = runs.len() as f64;
     // As much wider as Student's quantile is than the normal one: a standard deviation is read as 95 %
     // within 1.96 of it.
-    let widening = student_95(n - 1.0) / NORMAL_QUANTILE_95;
+    let widening = student_95(n - 1.0) / LEVELS.normal_quantile_95;
     Some(covariance.diagonal().iter().map(|variance| variance.sqrt() * widening).collect())
 }
 
@@ -124,7 +124,7 @@ pub(crate) fn tests_of(model: &AugmentedModel<'_>, extra_sigma: &[Vec<f64>]) -> 
     // As wide as Student's quantile is where measurements are few.
     let Some(equations) = total(&model.fit.solution.pass.runs) else { return Vec::new() };
     let freedom = freedom(&model.fit, &equations);
-    let few = student_95(freedom) / NORMAL_QUANTILE_95;
+    let few = student_95(freedom) / LEVELS.normal_quantile_95;
     let inflation = NullDistribution::of(model).map(|null| null.inflation_of_own());
     let test = |(candidate, extra_sigma): (usize, &Vec<f64>)| {
         let (mut test, directions) = wald_test(model, candidate)?;

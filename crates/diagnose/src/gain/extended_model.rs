@@ -14,7 +14,7 @@ use kinematics::{GeometryError, Pose};
 use model_term::ModelTerm;
 use scenario::{Estimated, EstimatedTerm, Instrument, Scenario};
 
-use crate::settings::records::FACTOR_TOLERANCE;
+use crate::settings::RECORDS;
 
 /// Why a scenario is no model for dead reckoning, or not that of a robot's log.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -240,7 +240,8 @@ fn of_variants(variants: Vec<Variant>, sizes: &[(String, f64)]) -> Vec<(Box<dyn 
 fn is_of_sizes(form: &RecordCorrection, sizes: &[(String, f64)]) -> bool {
     form.values.iter().all(|(name, value)| {
         let own = sizes.iter().find(|(of, _)| of == name);
-        *name == "probability" || own.is_some_and(|(_, own)| (own - value).abs() <= FACTOR_TOLERANCE * own.abs())
+        *name == "probability"
+            || own.is_some_and(|(_, own)| (own - value).abs() <= RECORDS.factor_tolerance * own.abs())
     })
 }
 

@@ -16,8 +16,7 @@ use crate::candidates::candidate::Candidate;
 use crate::fits::augmented_model::AugmentedModel;
 use crate::records::record_faults::Fault;
 use crate::records::stamp_errors::StampError;
-use crate::settings::findings::{MIN_CONTROLLER_COUNTS, STANDING_READING_INTERVAL_S};
-use crate::settings::plan::DEFAULT_SPEED_M_S;
+use crate::settings::{FINDINGS, PLAN};
 
 /// Motors and controllers of YAIR stand in for those of a robot that a dataset does not describe: what is
 /// diagnosed lies behind the encoders.
@@ -33,8 +32,8 @@ pub(crate) fn scenario_of(
 ) -> Result<Scenario, String> {
     let first = datasets.first().ok_or("no dataset")?;
     let fit = &model.fit.solution;
-    let counts = nominal.ticks_per_rev.unwrap_or(MIN_CONTROLLER_COUNTS);
-    let per_tick = (MIN_CONTROLLER_COUNTS / counts).ceil().max(1.0);
+    let counts = nominal.ticks_per_rev.unwrap_or(FINDINGS.min_controller_counts);
+    let per_tick = (FINDINGS.min_controller_counts / counts).ceil().max(1.0);
     let mut robot: Robot = toml::from_str(STAND_IN).map_err(|error| error.message().to_owned())?;
     robot.left_wheel_diameter_m = nominal.left_wheel_diameter_m;
     robot.right_wheel_diameter_m = nominal.right_wheel_diameter_m;
@@ -47,7 +46,7 @@ pub(crate) fn scenario_of(
     robot.points = stated.collect();
     let sigma_xy_m = fit.noise.sigma(NoiseComponent::MeasurementPosition);
     let sigma_theta_rad = fit.noise.sigma(NoiseComponent::MeasurementHeading);
-    let instrument = if sampling.between_measurements_s > STANDING_READING_INTERVAL_S {
+    let instrument = if sampling.between_measurements_s > FINDINGS.standing_reading_interval_s {
         if robot.points.len() < 2 {
             let half_m = 0.5 * nominal.wheel_separation_m;
             let mark = |id: &str, y_m| Mark { id: id.to_owned(), x_m: 0.0, y_m };
@@ -110,7 +109,7 @@ pub(crate) fn scenario_of(
         noise: Noise { wheel_sigma_m_per_sqrt_m: fit.noise.sigma(NoiseComponent::Wheel), sensitivity_sigma: 0.0 },
         placement: Placement { half_width_m: 0.05, half_width_rad: 0.02 },
         budget: None,
-        log: (sampling.between_rows_s < STANDING_READING_INTERVAL_S)
+        log: (sampling.between_rows_s < FINDINGS.standing_reading_interval_s)
             .then_some(Log { interval_s: sampling.between_rows_s }),
         instruments: vec![instrument],
         effects,
@@ -173,7 +172,7 @@ impl SamplingStatistics {
         let rows = runs.flat_map(|run| run.odometry.t_s.windows(2).map(|pair| pair[1] - pair[0]));
         let driven = model.fit.records.drive_statistics(&model.fit.solution.model);
         Self {
-            speed_m_s: driven.map_or(DEFAULT_SPEED_M_S, |driven| driven.cruise_speed_m_s).clamp(0.01, 5.0),
+            speed_m_s: driven.map_or(PLAN.default_speed_m_s, |driven| driven.cruise_speed_m_s).clamp(0.01, 5.0),
             acceleration_m_s2: driven.and_then(|driven| driven.acceleration_m_s2),
             between_rows_s: median(rows).unwrap_or(10.0).clamp(1e-3, 1e3),
             between_measurements_s: median(model.fit.records.times_between()).unwrap_or(10.0).clamp(1e-2, 1e3),

@@ -20,9 +20,7 @@ use crate::carry_over::{Level, Units};
 use crate::document::{Compared, Drift, Gain, GainLevel, HeldOutDrift, LevelGain};
 use crate::fits::augmented_model::{AugmentedModel, left_out_cost};
 use crate::fits::statistics::student_95;
-use crate::settings::levels::MIN_RUNS;
-use crate::settings::records::{SEPARATION_PRIOR_SIGMA, WHEEL_PRIOR_SIGMA};
-use crate::settings::search::{HOLD_OUT_FOLDS, MIN_HELD_OUT_UNITS};
+use crate::settings::{LEVELS, RECORDS, SEARCH};
 
 /// What one held-out unit scores.
 struct Unit {
@@ -57,7 +55,7 @@ pub(crate) fn gain_by_level(
     let gain = gain(base, extended)?;
     let runs = extended.fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).count();
     let mut levels = vec![LevelGain {
-        level: if runs >= MIN_RUNS { GainLevel::Runs } else { GainLevel::Blocks },
+        level: if runs >= LEVELS.min_runs { GainLevel::Runs } else { GainLevel::Blocks },
         units: gain.held_out_runs,
         log_score_per_observation: gain.log_score_per_observation,
         drift_percent: gain.drift_percent,
@@ -215,13 +213,13 @@ fn held_out_units(
         }
         HeldOut::Runs if runs == 0 => return Err("no run has measurements".to_owned()),
         HeldOut::Runs => {
-            let blocks = runs < MIN_RUNS;
-            let units = if blocks { fit.in_blocks(terms, MIN_RUNS.div_ceil(runs)) } else { by_runs() };
-            if units.len() < MIN_HELD_OUT_UNITS {
+            let blocks = runs < LEVELS.min_runs;
+            let units = if blocks { fit.in_blocks(terms, LEVELS.min_runs.div_ceil(runs)) } else { by_runs() };
+            if units.len() < SEARCH.min_held_out_units {
                 return Err("too few runs, and too few measurements in them to be held out in blocks".to_owned());
             }
             let fold_of = folds(fit, &units, blocks);
-            (units, fold_of, HOLD_OUT_FOLDS)
+            (units, fold_of, SEARCH.hold_out_folds)
         }
     };
     let free = fit.free_basis();
@@ -305,9 +303,9 @@ fn prior(fit: &ModelFit<'_>, terms: &[Box<dyn ModelTerm>], of_lengths: bool) -> 
     };
     let of = |column: &Column| match column {
         Column::Term(k) => (model.term_values[*k], prior_sigma[*k].powi(-2)),
-        Column::LeftWheel => length(model.m_per_rad.left, nominal.m_per_rad.left, WHEEL_PRIOR_SIGMA),
-        Column::RightWheel => length(model.m_per_rad.right, nominal.m_per_rad.right, WHEEL_PRIOR_SIGMA),
-        Column::Separation => length(model.separation_m, nominal.separation_m, SEPARATION_PRIOR_SIGMA),
+        Column::LeftWheel => length(model.m_per_rad.left, nominal.m_per_rad.left, RECORDS.wheel_prior_sigma),
+        Column::RightWheel => length(model.m_per_rad.right, nominal.m_per_rad.right, RECORDS.wheel_prior_sigma),
+        Column::Separation => length(model.separation_m, nominal.separation_m, RECORDS.separation_prior_sigma),
         _ => (0.0, 0.0),
     };
     fit.columns.iter().map(of).collect()
@@ -316,7 +314,7 @@ fn prior(fit: &ModelFit<'_>, terms: &[Box<dyn ModelTerm>], of_lengths: bool) -> 
 /// The fold of each unit: each protocol's units in turn.
 fn folds(fit: &ModelFit<'_>, units: &[NormalEquations], blocks: bool) -> Vec<usize> {
     if blocks {
-        return (0..units.len()).map(|unit| unit % HOLD_OUT_FOLDS).collect();
+        return (0..units.len()).map(|unit| unit % SEARCH.hold_out_folds).collect();
     }
     let protocol = |run: (usize, usize)| {
         fit.records.segments.iter().find(|segment| segment.run == run).and_then(|segment| segment.info.protocol)
@@ -336,7 +334,7 @@ fn folds(fit: &ModelFit<'_>, units: &[NormalEquations], blocks: bool) -> Vec<usi
         .collect();
     order.sort_unstable();
     let mut fold = vec![0; units.len()];
-    order.into_iter().enumerate().for_each(|(rank, (_, position))| fold[position] = rank % HOLD_OUT_FOLDS);
+    order.into_iter().enumerate().for_each(|(rank, (_, position))| fold[position] = rank % SEARCH.hold_out_folds);
     fold
 }
 

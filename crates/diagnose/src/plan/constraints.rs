@@ -6,8 +6,8 @@ use scenario::{Budget, Instrument, Scenario};
 
 use crate::fits::augmented_model::AugmentedModel;
 use crate::gain::extended_scenario::SamplingStatistics;
-use crate::settings::findings::STANDING_READING_INTERVAL_S;
-use crate::settings::plan::{CLEARANCE_SEPARATIONS, DEFAULT_ACCELERATION_M_S2, HANDLING_S, MINUTES};
+use crate::settings::plan::{HANDLING_S, MINUTES};
+use crate::settings::{FINDINGS, PLAN};
 
 /// What the user allows; `None` is taken from the data or the scenario.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -59,7 +59,7 @@ impl Setting {
         let sampling = SamplingStatistics::of(datasets, model);
         let separation_m = first.robot.wheel_separation_m;
         let (free_m, floor) = match limits.room_m {
-            Some(room_m) => (room_m.map(|side| side - CLEARANCE_SEPARATIONS * separation_m), of_room(room_m)),
+            Some(room_m) => (room_m.map(|side| side - PLAN.clearance_separations * separation_m), of_room(room_m)),
             None => {
                 let [x_m, y_m] = moved_over_m(datasets);
                 ([x_m, y_m], format!("the {x_m:.1} m by {y_m:.1} m over which the robot moved so far"))
@@ -68,7 +68,7 @@ impl Setting {
         let runs = || datasets.iter().flat_map(|dataset| &dataset.runs);
         let (minutes, time) = minutes(limits, MINUTES);
         let between = |run: &Run| run.truth.len() > 2 || run.displacements.len() > 1 || !run.point_readings.is_empty();
-        let reading = if sampling.between_measurements_s <= STANDING_READING_INTERVAL_S {
+        let reading = if sampling.between_measurements_s <= FINDINGS.standing_reading_interval_s {
             Reading::Even(sampling.between_measurements_s)
         } else if runs().any(between) {
             Reading::Standing
@@ -78,7 +78,7 @@ impl Setting {
         Some(Self {
             robot: first.robot,
             top_speed_m_s: limits.top_speed_m_s.unwrap_or(sampling.speed_m_s),
-            acceleration_m_s2: sampling.acceleration_m_s2.unwrap_or(DEFAULT_ACCELERATION_M_S2),
+            acceleration_m_s2: sampling.acceleration_m_s2.unwrap_or(PLAN.default_acceleration_m_s2),
             between_rows_s: sampling.between_rows_s,
             reading,
             sees_heading: !runs().any(|run| run.truth.iter().any(|sample| sample.theta_rad().is_none())),
@@ -95,7 +95,7 @@ impl Setting {
     pub(crate) fn of_scenario(scenario: &Scenario, limits: &Limits) -> Option<Self> {
         let budget = scenario.budget.as_ref();
         let clearance_m =
-            budget.map_or(CLEARANCE_SEPARATIONS * scenario.robot.wheel_separation_m, |budget| budget.clearance_m);
+            budget.map_or(PLAN.clearance_separations * scenario.robot.wheel_separation_m, |budget| budget.clearance_m);
         let stated = |budget: &Budget| [budget.room_x_m, budget.room_y_m];
         let room_m = limits.room_m.or_else(|| budget.map(stated))?;
         let of = if limits.room_m.is_some() { of_room(room_m) } else { format!("{} of [budget]", of_room(room_m)) };

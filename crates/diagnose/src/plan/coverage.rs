@@ -21,11 +21,7 @@ use super::text::Predictions;
 use crate::candidates::candidate::{Candidate, mean_terms, terms};
 use crate::document::{Blind, NextExperiment, Smallest};
 use crate::fits::augmented_model::AugmentedModel;
-use crate::settings::levels::DETECTION_SQRT_LAMBDA;
-use crate::settings::plan::{
-    GEOMETRY_PRECISION_VALUE, MAX_MANOEUVRES, MAX_PLANNED_VARIANTS, MIN_COVERAGE_GAIN, MIN_NOISE_SIGMA,
-    MIN_PLANNED_SIGMAS, NEW_MANOEUVRE_RATIO, UNDETERMINED_GEOMETRY_SIGMA,
-};
+use crate::settings::{LEVELS, PLAN};
 
 /// What shows an effect that goes with other conditions than what is driven; `None` where manoeuvres excite
 /// it.
@@ -76,7 +72,7 @@ fn some_shapes(candidates: &[Candidate]) -> Vec<Candidate> {
         .flat_map(|variants| {
             let last = variants.len() - 1;
             let mut indices: Vec<usize> =
-                (0..MAX_PLANNED_VARIANTS).map(|k| k * last / (MAX_PLANNED_VARIANTS - 1)).collect();
+                (0..PLAN.max_planned_variants).map(|k| k * last / (PLAN.max_planned_variants - 1)).collect();
             indices.dedup();
             indices.into_iter().map(|index| variants[index].clone())
         })
@@ -92,7 +88,10 @@ fn detectability_of(frame: &Frame, equations: &NormalEquations, target: &Target)
         .map(|(k, parameter)| {
             let root = information[(k, k)].max(0.0).sqrt();
             let (name, unit) = (parameter.name.to_owned(), parameter.unit.to_owned());
-            (parameter.prior_sigma * root, Smallest { value: DETECTION_SQRT_LAMBDA / root, unit, parameter: name })
+            (
+                parameter.prior_sigma * root,
+                Smallest { value: LEVELS.detection_sqrt_lambda / root, unit, parameter: name },
+            )
         })
         .max_by(|a, b| a.0.total_cmp(&b.0))
 }
@@ -117,7 +116,7 @@ fn detectability_of_all(
 fn detectable_effects(frame: &Frame, equations: &NormalEquations, targets: &[Target]) -> f64 {
     detectability_of_all(frame, equations, targets)
         .iter()
-        .map(|(_, sigmas, _)| (sigmas / DETECTION_SQRT_LAMBDA).min(1.0))
+        .map(|(_, sigmas, _)| (sigmas / LEVELS.detection_sqrt_lambda).min(1.0))
         .sum()
 }
 
@@ -136,13 +135,13 @@ fn mix(
             .filter_map(|(manoeuvre, of)| {
                 let cost = manoeuvre.cost(setting).minutes;
                 let known = parts.iter().any(|part| part.manoeuvre == *manoeuvre);
-                if minutes + cost > setting.minutes || !(known || parts.len() < MAX_MANOEUVRES) {
+                if minutes + cost > setting.minutes || !(known || parts.len() < PLAN.max_manoeuvres) {
                     return None;
                 }
                 let after = with_runs(&equations, &[(of, 1.0)]);
                 let there = worth(&after);
-                let preferred = if known { NEW_MANOEUVRE_RATIO } else { 1.0 };
-                (there - here > MIN_COVERAGE_GAIN).then_some((
+                let preferred = if known { PLAN.new_manoeuvre_ratio } else { 1.0 };
+                (there - here > PLAN.min_coverage_gain).then_some((
                     preferred * (there - here) / cost,
                     manoeuvre,
                     after,
@@ -217,7 +216,7 @@ pub(super) fn show(
     let was: Vec<&str> = detected_ids(&detectability_of_all(&frame, &before, &targets));
     let now: Vec<_> = detectability_of_all(&frame, &after, &targets)
         .into_iter()
-        .filter(|(id, sigmas, _)| *sigmas >= DETECTION_SQRT_LAMBDA && !was.contains(id))
+        .filter(|(id, sigmas, _)| *sigmas >= LEVELS.detection_sqrt_lambda && !was.contains(id))
         .collect();
     if parts.is_empty() || now.is_empty() {
         let ids: Vec<&str> = detectability.iter().map(|detectability| &detectability.id[..]).collect();
@@ -250,7 +249,7 @@ fn from_size(smallest: &Smallest) -> String {
 }
 
 fn detected_ids<'s>(all: &[(&'s str, f64, Smallest)]) -> Vec<&'s str> {
-    all.iter().filter(|(_, sigmas, _)| *sigmas >= DETECTION_SQRT_LAMBDA).map(|(id, ..)| *id).collect()
+    all.iter().filter(|(_, sigmas, _)| *sigmas >= LEVELS.detection_sqrt_lambda).map(|(id, ..)| *id).collect()
 }
 
 /// What to drive before there is any data.
@@ -318,7 +317,7 @@ pub fn plan_scenario(scenario: &Scenario, limits: &Limits) -> Result<ScenarioPla
     let (_, first) = options.first().ok_or_else(nothing_fits)?;
     let before = with_runs(first, &[(first, -1.0)]);
     let worth = |equations: &NormalEquations| {
-        detectable_effects(&frame, equations, &targets) - GEOMETRY_PRECISION_VALUE * spread(&frame, equations)
+        detectable_effects(&frame, equations, &targets) - PLAN.geometry_precision_value * spread(&frame, equations)
     };
     let (parts, after, minutes) = mix(&options, &before, &setting, worth);
     if parts.is_empty() {
@@ -335,15 +334,15 @@ pub fn plan_scenario(scenario: &Scenario, limits: &Limits) -> Result<ScenarioPla
     let sigmas: BTreeMap<String, f64> = geometry_parameters
         .iter()
         .zip(&relative)
-        .filter(|(_, relative)| **relative < UNDETERMINED_GEOMETRY_SIGMA)
+        .filter(|(_, relative)| **relative < PLAN.undetermined_geometry_sigma)
         .map(|((name, value), relative)| ((*name).to_owned(), value * relative))
         .collect();
     let all = detectability_of_all(&frame, &after, &targets);
     let (shows, detectability): (Vec<_>, Vec<_>) =
-        all.into_iter().partition(|(_, sigmas, _)| *sigmas >= DETECTION_SQRT_LAMBDA);
+        all.into_iter().partition(|(_, sigmas, _)| *sigmas >= LEVELS.detection_sqrt_lambda);
     let entry = |(id, sigmas, smallest): (&str, f64, Smallest)| {
-        let why = if sigmas > MIN_PLANNED_SIGMAS { from_size(&smallest) } else { "no run excites it".to_owned() };
-        Blind { id: id.to_owned(), why, smallest_detectable: (sigmas > MIN_PLANNED_SIGMAS).then_some(smallest) }
+        let why = if sigmas > PLAN.min_planned_sigmas { from_size(&smallest) } else { "no run excites it".to_owned() };
+        Blind { id: id.to_owned(), why, smallest_detectable: (sigmas > PLAN.min_planned_sigmas).then_some(smallest) }
     };
     let shows: Vec<Blind> = shows.into_iter().map(entry).collect();
     let mut blind_to: Vec<Blind> = detectability.into_iter().map(entry).collect();
@@ -402,8 +401,8 @@ fn noise(scenario: &Scenario) -> Option<Noise> {
         | Instrument::Wall(_)
         | Instrument::Revisit { .. } => None,
     })?;
-    let sigmas = [scenario.noise.wheel_sigma_m_per_sqrt_m, MIN_NOISE_SIGMA, xy_m, theta_rad];
-    Some(Noise { variance: sigmas.map(|sigma| sigma.max(MIN_NOISE_SIGMA).powi(2)), timing_s2: 0.0 })
+    let sigmas = [scenario.noise.wheel_sigma_m_per_sqrt_m, PLAN.min_noise_sigma, xy_m, theta_rad];
+    Some(Noise { variance: sigmas.map(|sigma| sigma.max(PLAN.min_noise_sigma).powi(2)), timing_s2: 0.0 })
 }
 
 #[cfg(test)]

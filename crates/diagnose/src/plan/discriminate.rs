@@ -15,8 +15,7 @@ use crate::document::NextExperiment;
 use crate::findings::finding::is_of_low_significance;
 use crate::fits::augmented_model::without;
 use crate::search::selection::SearchResult;
-use crate::settings::levels::LOW_SIGNIFICANCE_SIGMAS;
-use crate::settings::plan::{MAX_RUN_PAIRS, TWO_MANOEUVRES_TIME_RATIO};
+use crate::settings::{LEVELS, PLAN};
 
 /// What to drive to discriminate the causes of one finding; the error says why nothing does.
 pub(super) fn discriminate(
@@ -42,7 +41,8 @@ pub(super) fn discriminate(
         Rivals::new(frame, candidates, &before).ok_or("the data do not determine the candidates' parameters")?;
     let options = equations_of(&without.fit, &all, setting, manoeuvres);
     // Causes of low significance must become significant as well, where that can be.
-    let both = is_of_low_significance(found, index).then(|| rivals.clone().significant_by(LOW_SIGNIFICANCE_SIGMAS));
+    let both =
+        is_of_low_significance(found, index).then(|| rivals.clone().significant_by(LEVELS.low_significance_sigmas));
     let id = |k: usize| rivals.rival_columns[k].candidate.id();
 
     let search = |rivals| DiscriminationSearch { rivals, before: &before, options: &options, setting };
@@ -203,7 +203,7 @@ impl DiscriminationSearch<'_> {
     /// How many pairs of runs of each of some kinds the time allows.
     fn most_pairs(&self, kinds: &[&Driven], within_min: f64) -> u32 {
         let pairs = (within_min / self.minutes(kinds)).floor() as u32;
-        pairs.min(MAX_RUN_PAIRS)
+        pairs.min(PLAN.max_run_pairs)
     }
 
     /// What a pair of runs of each kind takes.
@@ -238,7 +238,8 @@ impl DiscriminationSearch<'_> {
             pairs.map(|pairs| self.parts(kinds, pairs)).filter(|(_, minutes)| *minutes < least).or(best)
         };
         let one = self.options.iter().fold(None, |best, option| quicker(best, &[option], self.setting.minutes));
-        let within_min = one.as_ref().map_or(self.setting.minutes, |(_, minutes)| TWO_MANOEUVRES_TIME_RATIO * minutes);
+        let within_min =
+            one.as_ref().map_or(self.setting.minutes, |(_, minutes)| PLAN.two_manoeuvres_time_ratio * minutes);
         self.twos().fold(one, |best, two| quicker(best, &two, within_min))
     }
 
@@ -287,7 +288,7 @@ mod tests {
         let options = [(library(&setting)[0], new)];
         let search = DiscriminationSearch { rivals: &rivals, before: &before, options: &options, setting: &setting };
         let margin = |pairs| search.margin(&[(0, 1)], &[&options[0]], pairs, Confidence::P50);
-        assert!(margin(1) > 0.0 && margin(MAX_RUN_PAIRS) < 0.0, "{} {}", margin(1), margin(MAX_RUN_PAIRS));
+        assert!(margin(1) > 0.0 && margin(PLAN.max_run_pairs) < 0.0, "{} {}", margin(1), margin(PLAN.max_run_pairs));
         assert_eq!(search.most_discriminated(&[(0, 1)], Confidence::P50), [(0, 1)]);
         assert_eq!(search.plan(Confidence::P50).map(|plan| plan.discriminated), Some(vec![(0, 1)]));
     }

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::constraints::{Reading, Setting};
 use crate::candidates::candidate::{Candidate, terms};
-use crate::settings::plan::{MIN_MANOEUVRE_LENGTH_M, SIZE_FRACTIONS, SPEED_FRACTIONS, SPIN_REVOLUTIONS, STANDSTILL_S};
+use crate::settings::PLAN;
 
 /// A pair of runs, one in each direction, at one speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,13 +32,13 @@ pub(crate) fn library(setting: &Setting) -> Vec<Manoeuvre> {
     let (shorter_m, longer_m) = setting.sides_m();
     let separation_m = setting.robot.wheel_separation_m;
     let mut schedules: Vec<Schedule> = Vec::new();
-    for size in SIZE_FRACTIONS {
+    for size in PLAN.size_fractions {
         let length_m = rounded(size * longer_m);
-        if length_m >= MIN_MANOEUVRE_LENGTH_M {
+        if length_m >= PLAN.min_manoeuvre_length_m {
             schedules.push(Schedule::Straights { length_m, runs: 2 });
         }
         let side_m = rounded(size * shorter_m);
-        if side_m >= MIN_MANOEUVRE_LENGTH_M {
+        if side_m >= PLAN.min_manoeuvre_length_m {
             schedules.push(Schedule::Squares { side_m, runs_each_way: 1 });
         }
         let radius_m = rounded(0.5 * size * shorter_m);
@@ -47,8 +47,8 @@ pub(crate) fn library(setting: &Setting) -> Vec<Manoeuvre> {
             schedules.push(Schedule::Circles { radius_m, turns: None, runs_each_way: 1 });
         }
     }
-    schedules.extend(SPIN_REVOLUTIONS.map(|turns| Schedule::Spins { turn_rad: turns * TAU, runs: 2 }));
-    let speeds = SPEED_FRACTIONS.map(|share| significant(share * setting.top_speed_m_s));
+    schedules.extend(PLAN.spin_revolutions.map(|turns| Schedule::Spins { turn_rad: turns * TAU, runs: 2 }));
+    let speeds = PLAN.speed_fractions.map(|share| significant(share * setting.top_speed_m_s));
     let all = speeds
         .into_iter()
         .flat_map(|speed_m_s| schedules.iter().map(move |schedule| Manoeuvre { schedule: *schedule, speed_m_s }));
@@ -88,7 +88,7 @@ fn log(program: &MotionProgram, setting: &Setting, speed_m_s: f64, phase_rad: Wh
     let geometry = setting.robot.geometry().ok()?;
     let m_per_rad = geometry.m_per_rad();
     let even = matches!(setting.reading, Reading::Even(_));
-    let standstill_s = if even { STANDSTILL_S } else { 0.0 };
+    let standstill_s = if even { PLAN.standstill_s } else { 0.0 };
     let (mut t_s, mut angle_rad) = (standstill_s, phase_rad);
     let (mut stretches, mut read_s): (Vec<Stretch>, Vec<f64>) = (Vec::new(), vec![0.0]);
     for motion in &program.motions {

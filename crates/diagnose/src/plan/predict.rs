@@ -15,7 +15,8 @@ use super::text;
 use crate::candidates::candidate::{Candidate, terms};
 use crate::document::{Predicted, Value};
 use crate::fits::augmented_model::AugmentedModel;
-use crate::settings::plan::{DERIVATIVE_STEP_SIGMAS, PREDICTION_INSTANTS, SINGLE_MEASUREMENT_SIGMAS, WHEEL_PHASES};
+use crate::settings::PLAN;
+use crate::settings::plan::PREDICTION_INSTANTS;
 
 /// What the robot does at one instant of one kind of run: mean, covariance by what is not known of the
 /// name, and variance by the noise.
@@ -87,7 +88,7 @@ pub(super) fn predictions(
         values: values.collect(),
     };
     let mut sentence = text::where_to_measure(&part, &at);
-    if sigmas < SINGLE_MEASUREMENT_SIGMAS {
+    if sigmas < PLAN.single_measurement_sigmas {
         sentence.push_str(" No single measurement discriminates them: all measurements of the runs together do.");
     }
     Some((sentence, predicted))
@@ -102,7 +103,7 @@ fn shares() -> [f64; PREDICTION_INSTANTS] {
 /// direction by direction and phase by phase.
 fn phases_at(index: usize) -> impl Iterator<Item = usize> {
     let (direction, instant) = (index / PREDICTION_INSTANTS, index % PREDICTION_INSTANTS);
-    (0..WHEEL_PHASES).map(move |phase| (direction * WHEEL_PHASES + phase) * PREDICTION_INSTANTS + instant)
+    (0..PLAN.wheel_phases).map(move |phase| (direction * PLAN.wheel_phases + phase) * PREDICTION_INSTANTS + instant)
 }
 
 /// Runs of a part, each measured at its start and at every instant, by direction and phase.
@@ -121,7 +122,7 @@ impl PlannedRun {
         let driven = |measurements: &[f64]| -> Option<dataset::Dataset> {
             let mut runs = Vec::new();
             for program in &programs {
-                for phase in (0..).take(WHEEL_PHASES).map(phase_rad) {
+                for phase in (0..).take(PLAN.wheel_phases).map(phase_rad) {
                     let speed_m_s = part.manoeuvre.speed_m_s;
                     let mut run =
                         planned_run(program, setting, speed_m_s, model, phase, Measurements::At(measurements))?;
@@ -168,16 +169,16 @@ impl PlannedRun {
         };
         let here = measurements(&named)?;
         let slope = |(k, column): (usize, &usize)| -> Option<Vec<Vector3<f64>>> {
-            let by = DERIVATIVE_STEP_SIGMAS * covariance[(k, k)].sqrt();
+            let by = PLAN.derivative_step_sigmas * covariance[(k, k)].sqrt();
             let mut beside = named.clone();
             beside.advance(column_at(*column), by);
             Some(measurements(&beside)?.iter().zip(&here).map(|(there, here)| (there - here) / by).collect())
         };
         let slopes: Vec<Vec<Vector3<f64>>> = columns.par_iter().enumerate().map(slope).collect::<Option<_>>()?;
         let mean = |index, of: &dyn Fn(usize) -> Vector3<f64>| {
-            phases_at(index).map(of).sum::<Vector3<f64>>() / WHEEL_PHASES as f64
+            phases_at(index).map(of).sum::<Vector3<f64>>() / PLAN.wheel_phases as f64
         };
-        let measured = (0..here.len() / WHEEL_PHASES).map(|index| {
+        let measured = (0..here.len() / PLAN.wheel_phases).map(|index| {
             let own = mean(index, &|measurement| here[measurement]);
             let noise = mean(index, &|measurement| self.noise[measurement]);
             let spread =

@@ -11,10 +11,7 @@ use nalgebra::{DMatrix, DVector};
 use super::manoeuvres::{Manoeuvre, Part};
 use crate::candidates::candidate::Candidate;
 use crate::fits::model_comparison::log_odds_margin;
-use crate::settings::levels::{NORMAL_QUANTILE_ONE_SIDED_95, SENSOR_HEADING_PRIOR_SIGMA_RAD};
-use crate::settings::plan::{
-    DESIGN_POINT_STEPS, GEOMETRY_PRIOR_SIGMA, GYRO_SCALE_PRIOR_SIGMA, LATENCY_PRIOR_SIGMA_S, LEVER_PRIOR_SIGMA_M,
-};
+use crate::settings::{LEVELS, PLAN};
 
 /// How sure it must be that causes are discriminated. The log of the odds is normal with mean λ/2 and
 /// variance λ.
@@ -32,11 +29,11 @@ pub(crate) enum Confidence {
 fn certain_log_odds(root: f64, root_sigma: f64) -> f64 {
     let at = |step: u32| {
         let (measurements, size) =
-            (std::f64::consts::FRAC_PI_2 * f64::from(step) / f64::from(DESIGN_POINT_STEPS)).sin_cos();
-        let root = (root - NORMAL_QUANTILE_ONE_SIDED_95 * size * root_sigma).max(0.0);
-        0.5 * root * root - NORMAL_QUANTILE_ONE_SIDED_95 * measurements * root
+            (std::f64::consts::FRAC_PI_2 * f64::from(step) / f64::from(PLAN.design_point_steps)).sin_cos();
+        let root = (root - LEVELS.normal_quantile_one_sided_95 * size * root_sigma).max(0.0);
+        0.5 * root * root - LEVELS.normal_quantile_one_sided_95 * measurements * root
     };
-    (0..=DESIGN_POINT_STEPS).map(at).fold(f64::INFINITY, f64::min)
+    (0..=PLAN.design_point_steps).map(at).fold(f64::INFINITY, f64::min)
 }
 
 /// One of several names, with its columns of the normal equation.
@@ -57,12 +54,12 @@ impl Frame {
     /// Of a fit with further terms: first those of the fit, then those of the candidates.
     pub(crate) fn of(fit: &ModelFit<'_>, terms: &[Candidate]) -> Self {
         let base = Column::BASE.map(|column| match column {
-            Column::LeftWheel | Column::RightWheel | Column::Separation => GEOMETRY_PRIOR_SIGMA,
-            Column::SensorX | Column::SensorY => LEVER_PRIOR_SIGMA_M,
-            Column::SensorTheta => SENSOR_HEADING_PRIOR_SIGMA_RAD,
+            Column::LeftWheel | Column::RightWheel | Column::Separation => PLAN.geometry_prior_sigma,
+            Column::SensorX | Column::SensorY => PLAN.lever_prior_sigma_m,
+            Column::SensorTheta => LEVELS.sensor_heading_prior_sigma_rad,
             // Plans are of the instrument that sees poses.
-            Column::GyroScale => GYRO_SCALE_PRIOR_SIGMA,
-            Column::Latency | Column::Term(_) => LATENCY_PRIOR_SIGMA_S,
+            Column::GyroScale => PLAN.gyro_scale_prior_sigma,
+            Column::Latency | Column::Term(_) => PLAN.latency_prior_sigma_s,
         });
         let of_terms = terms.iter().flat_map(Candidate::parameters).map(|parameter| parameter.prior_sigma);
         let precisions: Vec<f64> = base.into_iter().chain(of_terms).map(|sd| 1.0 / (sd * sd)).collect();

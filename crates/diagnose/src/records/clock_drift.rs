@@ -10,9 +10,7 @@
 use dataset::Dataset;
 
 use crate::records::clock_profile::{Profile, RunClock};
-use crate::settings::records::{
-    CLOCK_STEP_S, MAX_CLOCK_RATE, MAX_DRIFT_PARTS, MAX_DRIFT_STEPS, MIN_CLOCK_GAIN, MIN_DRIFT_PARTS,
-};
+use crate::settings::RECORDS;
 
 /// A drift of the robot's clock against the instrument's, in all runs.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,7 +73,7 @@ pub(crate) fn clock_drift(datasets: &[Dataset], clocks: &[RunClock], min_offset_
         let (line, sigma) = line_of(&parts)?;
         gain += gain_of(&parts, line);
         (slope, steps) = (line.slope, steps + 1);
-        if steps == MAX_DRIFT_STEPS || (slope * span_s(&parts)).abs() < 0.1 * CLOCK_STEP_S {
+        if steps == RECORDS.max_drift_steps || (slope * span_s(&parts)).abs() < 0.1 * RECORDS.clock_step_s {
             let drift = ClockDrift { rate: time_scale - 1.0, sigma, of_session, gain };
             return Some(DriftFound { drift, records, clocks });
         }
@@ -90,19 +88,20 @@ fn parts_of(clocks: &[RunClock], of_session: bool) -> Vec<Part<'_>> {
         .flat_map(|clock| clock.parts.iter().map(move |(run_s, profile)| (clock, run_s, profile)))
         .map(|(clock, run_s, profile)| Part { since_s: of_run(clock) + run_s, profile })
         .collect();
-    let every = all.len().div_ceil(MAX_DRIFT_PARTS).max(1);
+    let every = all.len().div_ceil(RECORDS.max_drift_parts).max(1);
     all.into_iter().step_by(every).collect()
 }
 
 /// A line that explains parts better than any one offset, and by how much.
 fn drift_of(parts: &[Part<'_>], min_offset_s: f64) -> Option<(Line, f64)> {
-    if parts.len() < MIN_DRIFT_PARTS {
+    if parts.len() < RECORDS.min_drift_parts {
         return None;
     }
     let (line, _) = line_of(parts)?;
     let gain = gain_of(parts, line);
     let at_ends_s = 0.5 * (line.slope * span_s(parts)).abs();
-    (gain > MIN_CLOCK_GAIN && at_ends_s >= min_offset_s && line.slope.abs() <= MAX_CLOCK_RATE).then_some((line, gain))
+    (gain > RECORDS.min_clock_gain && at_ends_s >= min_offset_s && line.slope.abs() <= RECORDS.max_clock_rate)
+        .then_some((line, gain))
 }
 
 /// Log likelihood of a line over that of the best of the parts' own offsets for all.
@@ -138,7 +137,7 @@ fn line_of(parts: &[Part<'_>]) -> Option<(Line, f64)> {
 /// offset is uncertain by up to what makes another clock, and by a cap beyond that.
 fn cost(parts: &[Part<'_>], line: Line) -> f64 {
     let of = |part: &Part<'_>| {
-        let most = MIN_CLOCK_GAIN * line.residual(part).powi(2).min(1.0);
+        let most = RECORDS.min_clock_gain * line.residual(part).powi(2).min(1.0);
         part.profile.gain_over(line.at(part)).min(most)
     };
     parts.iter().map(of).sum()
@@ -162,7 +161,7 @@ fn correct_times(records: &mut [Dataset], slope: f64, of_session: bool) {
 mod tests {
     use super::*;
     use crate::records::clock_profile::tests::driven;
-    use crate::settings::records::MIN_COMMON_CLOCK_OFFSET_S;
+    use crate::settings::RECORDS;
 
     /// Runs every so many seconds, whose poses are of so long before their stamps.
     fn every(seconds: f64, offsets_s: &[f64]) -> [Dataset; 1] {
@@ -174,7 +173,7 @@ mod tests {
     }
 
     fn sought(datasets: &[Dataset]) -> Option<DriftFound> {
-        clock_drift(datasets, &RunClock::of_all(datasets), MIN_COMMON_CLOCK_OFFSET_S)
+        clock_drift(datasets, &RunClock::of_all(datasets), RECORDS.min_common_clock_offset_s)
     }
 
     #[test]
@@ -183,7 +182,7 @@ mod tests {
         let DriftFound { drift, records, .. } = sought(&every(100.0, &offsets_s)).expect("it drifts");
         // A millisecond a second. Poses are taken at hundredths of a second, over ten minutes.
         assert!(drift.of_session && (drift.rate + 1e-3).abs() < 2e-5, "{drift:?}");
-        assert!(drift.sigma > 0.0 && drift.sigma < 5e-5 && drift.gain > MIN_CLOCK_GAIN, "{drift:?}");
+        assert!(drift.sigma > 0.0 && drift.sigma < 5e-5 && drift.gain > RECORDS.min_clock_gain, "{drift:?}");
         assert!(sought(&records).is_none(), "nothing is left");
         // Of the last run's stamps 0.6 s are taken, and a thousandth of its own.
         let last = |all: &[Dataset]| all[0].runs[6].truth[100].t_s;

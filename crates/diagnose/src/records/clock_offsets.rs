@@ -9,7 +9,7 @@ use rules::Rule;
 
 use crate::records::clock_profile::{Profile, RunClock};
 use crate::records::names::run_name;
-use crate::settings::records::{MIN_CLOCK_GAIN, MIN_CLOCK_RUNS, MIN_RUNS_PER_ODD_CLOCK};
+use crate::settings::RECORDS;
 
 /// An offset of the instrument's clock: its poses are of so long before their stamps.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,14 +45,14 @@ pub(crate) fn clock_offsets(datasets: &[Dataset], clocks: &[RunClock], min_commo
     let Some(common_s) = common_offset_s(&all) else { return Clocks::default() };
     let is_odd = |of: &&OfRun<'_>| {
         let apart_s = (of.profile.offset_s - common_s).abs();
-        all.len() >= MIN_CLOCK_RUNS
+        all.len() >= RECORDS.min_clock_runs
             && apart_s >= of.profile.tolerance_s()
-            && of.profile.gain_over(common_s) > MIN_CLOCK_GAIN
+            && of.profile.gain_over(common_s) > RECORDS.min_clock_gain
     };
     let odd: Vec<&OfRun<'_>> = all.iter().filter(is_odd).collect();
     // Where many runs have clocks of their own, none is the odd one: errors that are alike for seconds say so
     // of any run.
-    let few = (all.len() / MIN_RUNS_PER_ODD_CLOCK).max(1);
+    let few = (all.len() / RECORDS.min_runs_per_odd_clock).max(1);
     let odd = if odd.len() <= few { odd } else { Vec::new() };
     let own = |of: &&OfRun<'_>| ClockOffset {
         runs: Some(vec![run_name(datasets, of.run)]),
@@ -62,7 +62,7 @@ pub(crate) fn clock_offsets(datasets: &[Dataset], clocks: &[RunClock], min_commo
     };
     let mut offsets: Vec<ClockOffset> = odd.iter().map(own).collect();
     let gain: f64 = all.iter().map(|of| of.profile.gain_over(0.0) - of.profile.gain_over(common_s)).sum();
-    let is_common = common_s.abs() >= min_common_s && gain > MIN_CLOCK_GAIN;
+    let is_common = common_s.abs() >= min_common_s && gain > RECORDS.min_clock_gain;
     if is_common {
         let information: f64 = all.iter().map(|of| of.profile.sigma_s.powi(-2)).sum();
         offsets.push(ClockOffset { runs: None, offset_s: common_s, sigma_s: information.sqrt().recip(), gain });
@@ -104,11 +104,11 @@ mod tests {
 
     use super::*;
     use crate::records::clock_profile::tests::driven;
-    use crate::settings::records::MIN_COMMON_CLOCK_OFFSET_S;
+    use crate::settings::RECORDS;
     use crate::small_robot::assert_unmoved;
 
     fn offsets(datasets: &[Dataset]) -> Clocks {
-        clock_offsets(datasets, &RunClock::of_all(datasets), MIN_COMMON_CLOCK_OFFSET_S)
+        clock_offsets(datasets, &RunClock::of_all(datasets), RECORDS.min_common_clock_offset_s)
     }
 
     #[test]

@@ -13,10 +13,7 @@ use kinematics::{DriveGeometry, Increment, Wheels, wrap_to_pi};
 use rayon::prelude::*;
 
 use crate::records::log_rows::has_outlying_rows;
-use crate::settings::records::{
-    CLOCK_STEP_S, CLOCK_UNEXPLAINED, DRIFT_PARTS_PER_RUN, MAX_CLOCK_OFFSET_S, MAX_CLOCK_PAIRS, MAX_CLOCK_UNEXPLAINED,
-    MAX_RATE_AT_REST, MIN_CLOCK_OFFSET_S, MIN_CLOCK_PAIRS, MIN_CLOCK_SIGMAS, MIN_CLOCK_TURN_RAD, MIN_DRIFT_RUN_S,
-};
+use crate::settings::RECORDS;
 
 /// What a run's measurements say of its clock.
 pub(crate) struct RunClock {
@@ -48,7 +45,7 @@ impl RunClock {
         let whole = pairs.profile(ALWAYS, 1);
         let truth = &run.run().truth;
         let [from_s, to_s] = [truth[0].t_s, truth[truth.len() - 1].t_s];
-        let parts = if to_s - from_s >= MIN_DRIFT_RUN_S { DRIFT_PARTS_PER_RUN } else { 1 };
+        let parts = if to_s - from_s >= RECORDS.min_drift_run_s { RECORDS.drift_parts_per_run } else { 1 };
         let of_part = |part: usize| {
             let [from_s, to_s] = [part, part + 1].map(|end| from_s + (to_s - from_s) * end as f64 / parts as f64);
             let profile = if parts == 1 { whole.clone() } else { pairs.profile([from_s, to_s], parts) };
@@ -92,13 +89,14 @@ impl<'r> PosePairs<'r> {
         let track = WheelAngleInterpolator::of(run, &dataset.robot)?;
         let (rows_s, truth) = (&run.odometry().t_s, &run.run().truth);
         let [first_s, last_s] = known_between(rows_s, track.turns())?;
-        let within = |t_s: f64| t_s - MAX_CLOCK_OFFSET_S >= first_s && t_s + MAX_CLOCK_OFFSET_S <= last_s;
+        let within =
+            |t_s: f64| t_s - RECORDS.max_clock_offset_s >= first_s && t_s + RECORDS.max_clock_offset_s <= last_s;
         let poses: Vec<Pose4> = truth
             .iter()
             .filter(|sample| within(sample.t_s))
             .filter_map(|sample| Some((sample.t_s, sample.x_m, sample.y_m, sample.theta_rad()?)))
             .collect();
-        let is_asked = run.info().continuous && poses.len() > MIN_CLOCK_PAIRS && !has_outlying_rows(run.run());
+        let is_asked = run.info().continuous && poses.len() > RECORDS.min_clock_pairs && !has_outlying_rows(run.run());
         is_asked.then_some(Self { rows_s, track, geometry, poses })
     }
 
@@ -110,10 +108,12 @@ impl<'r> PosePairs<'r> {
             self.poses.partition_point(|pose| pose.0 < from_s)..self.poses.partition_point(|pose| pose.0 <= to_s);
         let poses = &self.poses[of_part];
         let (mut found, mut apart) = (None, 1);
-        while poses.len() > MIN_CLOCK_PAIRS * apart {
-            let Some((profile, unexplained)) = self.profile_of(poses, apart, MAX_CLOCK_PAIRS / parts) else { break };
-            found = (unexplained < MAX_CLOCK_UNEXPLAINED).then_some(profile);
-            if unexplained < CLOCK_UNEXPLAINED {
+        while poses.len() > RECORDS.min_clock_pairs * apart {
+            let Some((profile, unexplained)) = self.profile_of(poses, apart, RECORDS.max_clock_pairs / parts) else {
+                break;
+            };
+            found = (unexplained < RECORDS.max_clock_unexplained).then_some(profile);
+            if unexplained < RECORDS.clock_unexplained {
                 break;
             }
             apart *= 2;
@@ -127,7 +127,7 @@ impl<'r> PosePairs<'r> {
         let Self { rows_s, track, geometry, .. } = self;
         let stride = apart.max(poses.len().div_ceil(most));
         let pairs = || poses.windows(apart + 1).step_by(stride).map(|pair| (pair[0], pair[apart]));
-        let steps = (MAX_CLOCK_OFFSET_S / CLOCK_STEP_S).round() as i32;
+        let steps = (RECORDS.max_clock_offset_s / RECORDS.clock_step_s).round() as i32;
         // Below a tenth of a milliradian and of a millimetre a pair nothing distinguishes offsets, nor below
         // the rounding of the counts at its ends: where a robot turns evenly, pairs that fall alike between
         // counts at one offset fit by chance.
@@ -151,7 +151,7 @@ impl<'r> PosePairs<'r> {
             (turns / count, distances / count, count)
         };
         let cost = |step: i32| {
-            let (turns, distances, count) = left_at(CLOCK_STEP_S * f64::from(step));
+            let (turns, distances, count) = left_at(RECORDS.clock_step_s * f64::from(step));
             0.5 * count * ((turns + turns_floor).ln() + (distances + distances_floor).ln())
         };
         let costs: Vec<f64> = (-steps..=steps).map(cost).collect();
@@ -168,25 +168,26 @@ impl<'r> PosePairs<'r> {
         };
         let turned = mean(|(a, b)| wrap_to_pi(b.3 - a.3).powi(2));
         let went = mean(|(a, b)| (b.1 - a.1).powi(2) + (b.2 - a.2).powi(2));
-        let (turns_left, distances_left, _) = left_at(CLOCK_STEP_S * at);
-        let is_turning = turned > MIN_CLOCK_TURN_RAD * MIN_CLOCK_TURN_RAD;
+        let (turns_left, distances_left, _) = left_at(RECORDS.clock_step_s * at);
+        let is_turning = turned > RECORDS.min_clock_turn_rad * RECORDS.min_clock_turn_rad;
         let unexplained = if is_turning { turns_left / turned } else { distances_left / went };
-        let profile = Profile { costs, offset_s: CLOCK_STEP_S * at, sigma_s: CLOCK_STEP_S / curvature.sqrt() };
+        let profile =
+            Profile { costs, offset_s: RECORDS.clock_step_s * at, sigma_s: RECORDS.clock_step_s / curvature.sqrt() };
         Some((profile, unexplained))
     }
 }
 
 impl Profile {
     /// How far off other clocks it is no other clock, seconds.
-    pub(crate) const fn tolerance_s(&self) -> f64 {
-        MIN_CLOCK_OFFSET_S.max(MIN_CLOCK_SIGMAS * self.sigma_s)
+    pub(crate) fn tolerance_s(&self) -> f64 {
+        RECORDS.min_clock_offset_s.max(RECORDS.min_clock_sigmas * self.sigma_s)
     }
 
     /// Log likelihood of its offset over that of another.
     pub(crate) fn gain_over(&self, offset_s: f64) -> f64 {
         let lowest = self.costs.iter().copied().fold(f64::INFINITY, f64::min);
         let middle = (self.costs.len() / 2) as f64;
-        let at = (offset_s / CLOCK_STEP_S + middle).clamp(0.0, 2.0 * middle);
+        let at = (offset_s / RECORDS.clock_step_s + middle).clamp(0.0, 2.0 * middle);
         let (below, share) = (at.floor() as usize, at.fract());
         let above = (below + 1).min(self.costs.len() - 1);
         self.costs[below] + share * (self.costs[above] - self.costs[below]) - lowest
@@ -203,7 +204,7 @@ fn known_between(rows_s: &[f64], turns: &Wheels<Vec<f64>>) -> Option<[f64; 2]> {
     };
     let intervals = rows_s.len().checked_sub(1).filter(|intervals| *intervals > 0)?;
     let fastest = (0..intervals).map(rate).fold(0.0, f64::max);
-    let stands = |row: usize| rate(row) <= MAX_RATE_AT_REST * fastest;
+    let stands = |row: usize| rate(row) <= RECORDS.max_rate_at_rest * fastest;
     Some([
         if stands(0) { f64::NEG_INFINITY } else { first_s },
         if stands(intervals - 1) { f64::INFINITY } else { last_s },

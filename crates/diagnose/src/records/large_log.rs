@@ -16,9 +16,8 @@ use estimation::{Part, over_parts, rows_and_measurements};
 use crate::checks::check::TestResult;
 use crate::document::{RowFault, Subsample};
 use crate::records::log_rows::{Rows, Spans};
-use crate::settings::large_log::{
-    GOLDEN_SECTION, MAX_FAULTY_STRETCHES, STRETCH_MEASUREMENTS, SUBSAMPLE_MEASUREMENTS, SUBSAMPLE_ROWS,
-};
+use crate::settings::LARGE_LOG;
+use crate::settings::large_log::{STRETCH_MEASUREMENTS, SUBSAMPLE_MEASUREMENTS};
 use crate::text;
 
 /// A log of which stretches are diagnosed.
@@ -57,7 +56,7 @@ impl LargeLog {
             of.faults.iter().for_each(|id| faults.entry(id).or_default().push(number));
         }
         for of_fault in faults.values() {
-            let more = spread(of_fault.len(), of_fault.len().min(MAX_FAULTY_STRETCHES));
+            let more = spread(of_fault.len(), of_fault.len().min(LARGE_LOG.max_faulty_stretches));
             taken.extend(more.into_iter().map(|place| of_fault[place]));
         }
         taken.sort_unstable();
@@ -116,7 +115,7 @@ impl LargeLog {
 fn stretches(datasets: &[Blocks]) -> Vec<Part> {
     let (rows, measurements) = rows_and_measurements(datasets);
     let wanted = (STRETCH_MEASUREMENTS.saturating_mul(rows) / measurements.max(1))
-        .min(STRETCH_MEASUREMENTS * SUBSAMPLE_ROWS / SUBSAMPLE_MEASUREMENTS);
+        .min(STRETCH_MEASUREMENTS * LARGE_LOG.subsample_rows / SUBSAMPLE_MEASUREMENTS);
     let blocks = wanted.div_ceil(Blocks::ROWS).max(1);
     let of_dataset = |(number, dataset): (usize, &Blocks)| {
         let counts: Vec<usize> = (0..dataset.infos().len()).map(|run| dataset.blocks(run)).collect();
@@ -128,14 +127,14 @@ fn stretches(datasets: &[Blocks]) -> Vec<Part> {
 /// How many of the stretches are diagnosed.
 fn wanted(stretches: usize, rows: usize, measurements: usize) -> usize {
     let share = |most: usize, of: usize| stretches.saturating_mul(most) / of.max(1);
-    share(SUBSAMPLE_MEASUREMENTS, measurements).min(share(SUBSAMPLE_ROWS, rows)).clamp(1, stretches.max(1))
+    share(SUBSAMPLE_MEASUREMENTS, measurements).min(share(LARGE_LOG.subsample_rows, rows)).clamp(1, stretches.max(1))
 }
 
 /// One place in each of `wanted` successive parts of `all` places.
 fn spread(all: usize, wanted: usize) -> Vec<usize> {
     let place = |stratum: usize| {
         let [from, to] = [stratum, stratum + 1].map(|edge| edge * all / wanted);
-        let share = (GOLDEN_SECTION * stratum as f64).fract();
+        let share = (LARGE_LOG.golden_section * stratum as f64).fract();
         from + (share * (to - from) as f64) as usize
     };
     if all == 0 { Vec::new() } else { (0..wanted).map(place).collect() }
@@ -238,7 +237,7 @@ mod tests {
     #[test]
     fn rows_and_measurements_bound_what_is_taken_and_something_is() {
         assert_eq!(wanted(1000, 2 * SUBSAMPLE_MEASUREMENTS, 2 * SUBSAMPLE_MEASUREMENTS), 500);
-        assert_eq!(wanted(1000, 10 * SUBSAMPLE_ROWS, SUBSAMPLE_MEASUREMENTS), 100);
+        assert_eq!(wanted(1000, 10 * LARGE_LOG.subsample_rows, SUBSAMPLE_MEASUREMENTS), 100);
         assert_eq!(wanted(1000, 10, 10), 1000);
         assert_eq!(wanted(1, usize::MAX >> 20, 1), 1);
     }

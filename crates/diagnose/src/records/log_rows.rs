@@ -12,10 +12,7 @@ use estimation::stamp_jitter_s;
 use statrs::distribution::{DiscreteCDF, Poisson};
 
 use crate::checks::check::{Check, TestResult};
-use crate::settings::records::{
-    COUNT_ROUNDING, LOG_ROWS_LEVEL, MAX_CLOCK_RATIO, OUTLYING_ROW_PROBABILITY, OUTLYING_ROW_RANGES, RECURRENCE_ROWS,
-    STANDSTILL_RATE_RATIO,
-};
+use crate::settings::RECORDS;
 
 /// The spans of runs, by session and run.
 #[derive(Debug, Clone, Default)]
@@ -33,7 +30,7 @@ impl Spans {
     pub(crate) fn test(&self) -> Option<TestResult> {
         let ratio = |of: &RunSpans| of.comparable_s().map(|[logged_s, measured_s]| logged_s / measured_s);
         let statistic = median(self.0.values().filter_map(ratio))?;
-        let passes = (MAX_CLOCK_RATIO.recip()..MAX_CLOCK_RATIO).contains(&statistic);
+        let passes = (RECORDS.max_clock_ratio.recip()..RECORDS.max_clock_ratio).contains(&statistic);
         // No scatter makes a clock thirty times as fast: the p-value is 0 or 1.
         Some(TestResult { check: Check::LogSpans, statistic, p_value: f64::from(u8::from(passes)), passes })
     }
@@ -78,10 +75,10 @@ impl Rows {
 
     /// Tests whether more of them are outlying than chance makes; `None` where there are none.
     pub(crate) fn test(&self) -> Option<TestResult> {
-        let expected = Poisson::new(OUTLYING_ROW_PROBABILITY * self.all as f64).ok()?;
+        let expected = Poisson::new(RECORDS.outlying_row_probability * self.all as f64).ok()?;
         let p_value = self.outlying.checked_sub(1).map_or(1.0, |fewer| expected.sf(fewer as u64));
         let statistic = self.outlying as f64;
-        Some(TestResult { check: Check::LogRows, statistic, p_value, passes: p_value >= LOG_ROWS_LEVEL })
+        Some(TestResult { check: Check::LogRows, statistic, p_value, passes: p_value >= RECORDS.log_rows_level })
     }
 }
 
@@ -113,9 +110,9 @@ fn of_column(t_s: &[f64], ticks: &[i64]) -> Rows {
         let (least, most) =
             around.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), rate| (a.min(*rate), b.max(*rate)));
         rows.all += 1;
-        let uncertain = ((most - least) * dt_s).max(COUNT_ROUNDING).max(mean.abs() * apart_s);
-        let is_standing = rate.abs() < STANDSTILL_RATE_RATIO * mean.abs() || mean == 0.0;
-        let is_outlying = !is_standing && ((rate - mean) * dt_s).abs() > OUTLYING_ROW_RANGES * uncertain;
+        let uncertain = ((most - least) * dt_s).max(RECORDS.count_rounding).max(mean.abs() * apart_s);
+        let is_standing = rate.abs() < RECORDS.standstill_rate_ratio * mean.abs() || mean == 0.0;
+        let is_outlying = !is_standing && ((rate - mean) * dt_s).abs() > RECORDS.outlying_row_ranges * uncertain;
         if is_outlying && !recurs(&rates, first + 2, mean) {
             rows.outlying += 1;
         }
@@ -128,8 +125,8 @@ fn of_column(t_s: &[f64], ticks: &[i64]) -> Rows {
 /// increment gives back what was outlying.
 fn recurs(rates: &[(f64, f64)], row: usize, mean: f64) -> bool {
     let off = rates[row].1 - mean;
-    let before = row.saturating_sub(RECURRENCE_ROWS)..row;
-    let after = row + 2..(row + RECURRENCE_ROWS + 2).min(rates.len());
+    let before = row.saturating_sub(RECORDS.recurrence_rows)..row;
+    let after = row + 2..(row + RECORDS.recurrence_rows + 2).min(rates.len());
     before.chain(after).any(|other| (rates[other].1 - mean) * off.signum() > 0.5 * off.abs())
 }
 

@@ -3,14 +3,17 @@
 use dataset::{Dataset, Session};
 use estimation::{ModelFit, Thinning};
 
-use crate::settings::search::{MAX_SHARE_OF_PART, MEASUREMENTS_OF_PART, MIN_RUNS_OF_PART};
+use crate::settings::SEARCH;
 
-/// Runs of every kind with [`MEASUREMENTS_OF_PART`] measurements; `None` where that is no small part of what
+/// Runs of every kind with `measurements_of_part` measurements; `None` where that is no small part of what
 /// a fit of all measurements has.
 pub(crate) fn part_of_runs<'a>(datasets: &'a [Dataset], base: &ModelFit<'_>) -> Option<Vec<Session<'a>>> {
-    let share = MEASUREMENTS_OF_PART / base.records.measurements().max(1) as f64;
+    let share = SEARCH.measurements_of_part / base.records.measurements().max(1) as f64;
     let runs: usize = datasets.iter().map(|dataset| dataset.runs.len()).sum();
-    if base.thinning != Thinning::NONE || share > MAX_SHARE_OF_PART || (runs as f64) * share < MIN_RUNS_OF_PART {
+    if base.thinning != Thinning::NONE
+        || share > SEARCH.max_share_of_part
+        || (runs as f64) * share < SEARCH.min_runs_of_part
+    {
         return None;
     }
     let mut is_in_part = share_of_runs(share);

@@ -15,10 +15,7 @@ use rayon::prelude::*;
 
 use crate::records::clock_profile::turns_at;
 use crate::records::log_rows::has_outlying_rows;
-use crate::settings::records::{
-    MIN_GAP_RATIO, MIN_WINDOW_POSES, MIN_WINDOWS_PER_EXTRINSICS, REWEIGHTINGS, WINDOW_DISTANCE_SEPARATIONS,
-    WINDOW_SPANS,
-};
+use crate::settings::RECORDS;
 
 /// The measured poses of a run, and the travel of its wheels between them by nominal lengths.
 pub(crate) struct PoseTrack {
@@ -48,7 +45,7 @@ impl PoseTrack {
     }
 
     fn of(run: &dataset::RunView<'_>, dataset: &Dataset, number: (usize, usize), late_s: f64) -> Option<Self> {
-        if !run.info().continuous || run.run().truth.len() < MIN_WINDOW_POSES || has_outlying_rows(run.run()) {
+        if !run.info().continuous || run.run().truth.len() < RECORDS.min_window_poses || has_outlying_rows(run.run()) {
             return None;
         }
         let m_per_rad = dataset.robot.geometry().ok()?.m_per_rad();
@@ -57,7 +54,7 @@ impl PoseTrack {
         let (first_s, last_s) = (*rows_s.first()?, *rows_s.last()?);
         let angles = |row: usize| track.turns().as_ref().map(|turns| turns[row]);
         let between = |t_s: f64| turns_at(rows_s, track.turns(), t_s);
-        let gap_s = MIN_GAP_RATIO * median(rows_s.windows(2).map(|pair| pair[1] - pair[0]))?;
+        let gap_s = RECORDS.min_gap_ratio * median(rows_s.windows(2).map(|pair| pair[1] - pair[0]))?;
         let mut of = Self { run: number, t_s: vec![], measured: vec![], steps_m: vec![], after: vec![], gaps: vec![] };
         let mut gaps = 0;
         let (mut last, mut row) = (Wheels::both(0.0), 0);
@@ -86,7 +83,7 @@ impl PoseTrack {
             of.after.push(of.steps_m.len());
             of.gaps.push((gaps, gaps + usize::from(within)));
         }
-        (of.t_s.len() >= MIN_WINDOW_POSES).then_some(of)
+        (of.t_s.len() >= RECORDS.min_window_poses).then_some(of)
     }
 
     /// Are rows missing between two poses? What the wheels did meanwhile may be missing with them.
@@ -163,7 +160,7 @@ impl<'t> CalibratedTracks<'t> {
             })
             .collect();
         let mut per_m = Vector2::zeros();
-        for _ in 0..REWEIGHTINGS {
+        for _ in 0..RECORDS.reweightings {
             let (mut information, mut score) = (Matrix2::identity() * 1e-9, Vector2::zeros());
             for (row, turn_rad) in &rows {
                 let weight = 1.0 / (turn_rad - row.dot(&per_m)).abs().max(1e-4);
@@ -225,7 +222,7 @@ impl<'t> CalibratedTracks<'t> {
         let taken = windows(self.tracks[track].len(), self.span).filter(|window| is_taken(*window));
         let rows: Vec<ExtrinsicsRow> =
             extrinsics_rows(&self.tracks[track], &self.dead_reckoned[track], taken).collect();
-        if rows.len() < MIN_WINDOWS_PER_EXTRINSICS {
+        if rows.len() < RECORDS.min_windows_per_extrinsics {
             return None;
         }
         mounting(&rows, self.body_from_sensor)
@@ -246,9 +243,9 @@ fn span(tracks: &[PoseTrack], separation_m: f64) -> Option<usize> {
                 left.abs().max(right.abs())
             })
         });
-        median(distances_m).is_some_and(|m| m > WINDOW_DISTANCE_SEPARATIONS * separation_m)
+        median(distances_m).is_some_and(|m| m > RECORDS.window_distance_separations * separation_m)
     };
-    WINDOW_SPANS.into_iter().find(reaches)
+    RECORDS.window_spans.into_iter().find(reaches)
 }
 
 /// One window in the linear equation of the extrinsics: the motion by the instrument, that by the wheels, and
@@ -296,7 +293,7 @@ fn mounting(rows: &[ExtrinsicsRow], near: Pose) -> Option<(Pose, [f64; 3])> {
     let mut of = near;
     let mut weights = vec![0.0; rows.len()];
     let mut squares = 0.0;
-    for _ in 0..REWEIGHTINGS {
+    for _ in 0..RECORDS.reweightings {
         // What the windows do not determine stays near: a metre and a radian are weak enough.
         let mut information = Matrix3::from_diagonal_element(1e-6);
         let mut score = -1e-6 * Vector3::new(of.x_m - near.x_m, of.y_m - near.y_m, of.theta_rad - near.theta_rad);
@@ -340,7 +337,7 @@ impl Extrinsics {
             [Vector4::new(m.x, -m.y, 1.0 - cos, sin), Vector4::new(m.y, m.x, -sin, 1.0 - cos)]
         };
         let mut of = Vector4::new(1.0, 0.0, 0.0, 0.0);
-        for _ in 0..REWEIGHTINGS {
+        for _ in 0..RECORDS.reweightings {
             // What the windows do not determine stays 0: a metre of lever arm is weak enough.
             let mut information = Matrix4::from_diagonal(&Vector4::new(1e-9, 1e-9, 1e-6, 1e-6));
             let mut score = Vector4::zeros();

@@ -13,14 +13,7 @@ use crate::candidates::candidate::{Candidate, terms};
 use crate::fits::augmented_model::{cost, count};
 use crate::fits::model_comparison::log_odds_margin;
 use crate::records::same_measurements::{with_same_measurements, with_unknown_motion_of};
-use crate::settings::levels::SENSOR_HEADING_PRIOR_SIGMA_RAD;
-use crate::settings::records::{
-    FACTOR_TOLERANCE, LOG_ODDS_OF_A_MISTAKE, MAX_CORRECTED_OUTLIER_FRACTION, MAX_CORRELATED_WHEEL_SIGMA,
-    MAX_REMAINING_NOISE_RATIO, MAX_REMAINING_OUTLIER_RATIO, MAX_SENSOR_HEADING_RAD, MAX_SEPARATION_DEVIATION_SIGMAS,
-    MAX_SOUND_OUTLIER_FRACTION, MAX_TURN_SIGMA_RAD_PER_SQRT_RAD, MAX_WHEEL_DEVIATION_SIGMAS,
-    MAX_WHEEL_SIGMA_M_PER_SQRT_M, MIN_FAULT_LOG_LIKELIHOOD_GAIN, SEPARATION_PRIOR_SIGMA,
-    UNCORRELATED_MEASUREMENT_SIGMA, UNCORRELATED_NOISE_FACTOR, WHEEL_PRIOR_SIGMA, WRONG_WHEELS_FACTOR,
-};
+use crate::settings::{LEVELS, RECORDS};
 
 /// A fault with the records without it.
 pub(crate) struct Fault {
@@ -78,7 +71,7 @@ pub(crate) fn fault(
         };
         tried.push((fault.id, visible_in_log, fault.gain));
         if best.as_ref().is_none_or(better) {
-            let gain = fault.gain.max(MIN_FAULT_LOG_LIKELIHOOD_GAIN);
+            let gain = fault.gain.max(RECORDS.min_fault_log_likelihood_gain);
             best = Some((visible_in_log, Fault { gain, ..fault }));
         }
     }
@@ -104,13 +97,13 @@ fn explained_by(
         // Records that no plausible drive follows, rewritten or not, say nothing of the fault, unless they
         // show it by themselves. What was lost is not restored to the last count: measurements may still lie
         // off, but far fewer of them.
-        let most_outliers = base.map_or(MAX_CORRECTED_OUTLIER_FRACTION, |base| {
-            MAX_CORRECTED_OUTLIER_FRACTION.max(MAX_REMAINING_OUTLIER_RATIO * rejected_share(base))
+        let most_outliers = base.map_or(RECORDS.max_corrected_outlier_fraction, |base| {
+            RECORDS.max_corrected_outlier_fraction.max(RECORDS.max_remaining_outlier_ratio * rejected_share(base))
         });
         let is_plausible = (is_drive(&fit) || base.is_some_and(|base| is_far_more_of_a_drive(&fit, base)))
             && is_correlated(&fit, &[])
             && rejected_share(&fit) < most_outliers
-            && fit.solution.model.body_from_sensor.theta_rad.abs() <= MAX_SENSOR_HEADING_RAD;
+            && fit.solution.model.body_from_sensor.theta_rad.abs() <= RECORDS.max_sensor_heading_rad;
         if !is_plausible && !visible_in_log {
             return None;
         }
@@ -120,12 +113,12 @@ fn explained_by(
             Some([before, after]) => gain(before.as_ref(), after.as_ref()?)?,
             None => gain(base, &fit)?,
         };
-        let gain = gain - f64::from(mistakes - 1) * LOG_ODDS_OF_A_MISTAKE;
+        let gain = gain - f64::from(mistakes - 1) * RECORDS.log_odds_of_a_mistake;
         // What the log shows needs no instrument; one must not contradict it, where it has anything to say.
         let min_gain = match visible_in_log {
             true if uncorrelated => f64::NEG_INFINITY,
-            true => -MIN_FAULT_LOG_LIKELIHOOD_GAIN,
-            false => MIN_FAULT_LOG_LIKELIHOOD_GAIN,
+            true => -RECORDS.min_fault_log_likelihood_gain,
+            false => RECORDS.min_fault_log_likelihood_gain,
         };
         drop(fits);
         drop(fit);
@@ -164,10 +157,10 @@ fn rivals(tried: &[(&'static str, bool, f64)], visible: bool, best: &Fault) -> V
 fn implausible(fit: &ModelFit<'_>) -> f64 {
     let (model, nominal) = (&fit.solution.model, &fit.nominal);
     let off = |of: f64, nominal: f64, sd: f64| 0.5 * ((of / nominal).abs().ln() / sd).powi(2);
-    off(model.m_per_rad.left, nominal.m_per_rad.left, WHEEL_PRIOR_SIGMA)
-        + off(model.m_per_rad.right, nominal.m_per_rad.right, WHEEL_PRIOR_SIGMA)
-        + off(model.separation_m, nominal.separation_m, SEPARATION_PRIOR_SIGMA)
-        + 0.5 * (model.body_from_sensor.theta_rad / SENSOR_HEADING_PRIOR_SIGMA_RAD).powi(2)
+    off(model.m_per_rad.left, nominal.m_per_rad.left, RECORDS.wheel_prior_sigma)
+        + off(model.m_per_rad.right, nominal.m_per_rad.right, RECORDS.wheel_prior_sigma)
+        + off(model.separation_m, nominal.separation_m, RECORDS.separation_prior_sigma)
+        + 0.5 * (model.body_from_sensor.theta_rad / LEVELS.sensor_heading_prior_sigma_rad).powi(2)
 }
 
 /// Share of measurements that a fit takes for outliers.
@@ -177,7 +170,7 @@ pub(crate) fn rejected_share(fit: &ModelFit<'_>) -> f64 {
 
 /// Whether a base fit is plausible and rejects few measurements.
 fn is_sound(fit: &ModelFit<'_>) -> bool {
-    is_drive(fit) && rejected_share(fit) < MAX_SOUND_OUTLIER_FRACTION
+    is_drive(fit) && rejected_share(fit) < RECORDS.max_sound_outlier_fraction
 }
 
 /// Whether the odometry is correlated with the measurements, for some geometry: its noise is that of a
@@ -187,10 +180,11 @@ pub(crate) fn is_correlated(fit: &ModelFit<'_>, candidates: &[Candidate]) -> boo
     let sigma = |of| fit.solution.noise.sigma(of);
     // A robot that turns on the spot goes nowhere.
     let extent_m = fit.records.extent_m().max(fit.nominal.separation_m);
-    let follows = sigma(NoiseComponent::Wheel) < UNCORRELATED_NOISE_FACTOR * MAX_WHEEL_SIGMA_M_PER_SQRT_M
-        && sigma(NoiseComponent::Turn) < UNCORRELATED_NOISE_FACTOR * MAX_TURN_SIGMA_RAD_PER_SQRT_RAD
-        && sigma(NoiseComponent::MeasurementPosition) < UNCORRELATED_MEASUREMENT_SIGMA * extent_m
-        && sigma(NoiseComponent::MeasurementHeading) < UNCORRELATED_MEASUREMENT_SIGMA;
+    let follows = sigma(NoiseComponent::Wheel)
+        < RECORDS.uncorrelated_noise_factor * RECORDS.max_wheel_sigma_m_per_sqrt_m
+        && sigma(NoiseComponent::Turn) < RECORDS.uncorrelated_noise_factor * RECORDS.max_turn_sigma_rad_per_sqrt_rad
+        && sigma(NoiseComponent::MeasurementPosition) < RECORDS.uncorrelated_measurement_sigma * extent_m
+        && sigma(NoiseComponent::MeasurementHeading) < RECORDS.uncorrelated_measurement_sigma;
     follows || determines_wheels(fit, candidates)
 }
 
@@ -204,14 +198,16 @@ pub(crate) fn determines_wheels(fit: &ModelFit<'_>, candidates: &[Candidate]) ->
     };
     let wheels = [Column::LeftWheel, Column::RightWheel].map(relative_sigma);
     has_stated_geometry(fit)
-        && wheels.iter().all(|sigma| sigma.is_some_and(|sigma| sigma > 0.0 && sigma < MAX_CORRELATED_WHEEL_SIGMA))
+        && wheels
+            .iter()
+            .all(|sigma| sigma.is_some_and(|sigma| sigma > 0.0 && sigma < RECORDS.max_correlated_wheel_sigma))
 }
 
 /// Are a fit's geometry and noise those of a drive?
 fn is_drive(fit: &ModelFit<'_>) -> bool {
     has_stated_geometry(fit)
-        && fit.solution.noise.sigma(NoiseComponent::Wheel) < MAX_WHEEL_SIGMA_M_PER_SQRT_M
-        && fit.solution.noise.sigma(NoiseComponent::Turn) < MAX_TURN_SIGMA_RAD_PER_SQRT_RAD
+        && fit.solution.noise.sigma(NoiseComponent::Wheel) < RECORDS.max_wheel_sigma_m_per_sqrt_m
+        && fit.solution.noise.sigma(NoiseComponent::Turn) < RECORDS.max_turn_sigma_rad_per_sqrt_rad
         && fit.solution.converged
 }
 
@@ -220,8 +216,8 @@ fn is_drive(fit: &ModelFit<'_>) -> bool {
 fn is_far_more_of_a_drive(fit: &ModelFit<'_>, than: &ModelFit<'_>) -> bool {
     let wheel_sigma = |fit: &ModelFit<'_>| fit.solution.noise.sigma(NoiseComponent::Wheel);
     has_stated_geometry(fit)
-        && fit.solution.noise.sigma(NoiseComponent::Turn) < MAX_TURN_SIGMA_RAD_PER_SQRT_RAD
-        && (!has_stated_geometry(than) || wheel_sigma(fit) < MAX_REMAINING_NOISE_RATIO * wheel_sigma(than))
+        && fit.solution.noise.sigma(NoiseComponent::Turn) < RECORDS.max_turn_sigma_rad_per_sqrt_rad
+        && (!has_stated_geometry(than) || wheel_sigma(fit) < RECORDS.max_remaining_noise_ratio * wheel_sigma(than))
         && fit.solution.converged
 }
 
@@ -229,9 +225,19 @@ fn is_far_more_of_a_drive(fit: &ModelFit<'_>, than: &ModelFit<'_>) -> bool {
 fn has_stated_geometry(fit: &ModelFit<'_>) -> bool {
     let (model, nominal) = (&fit.solution.model, &fit.nominal);
     let is_near = |of: f64, nominal: f64, by: f64| (of / nominal).ln().abs() < by;
-    is_near(model.m_per_rad.left, nominal.m_per_rad.left, MAX_WHEEL_DEVIATION_SIGMAS * WHEEL_PRIOR_SIGMA)
-        && is_near(model.m_per_rad.right, nominal.m_per_rad.right, MAX_WHEEL_DEVIATION_SIGMAS * WHEEL_PRIOR_SIGMA)
-        && is_near(model.separation_m, nominal.separation_m, MAX_SEPARATION_DEVIATION_SIGMAS * SEPARATION_PRIOR_SIGMA)
+    is_near(
+        model.m_per_rad.left,
+        nominal.m_per_rad.left,
+        RECORDS.max_wheel_deviation_sigmas * RECORDS.wheel_prior_sigma,
+    ) && is_near(
+        model.m_per_rad.right,
+        nominal.m_per_rad.right,
+        RECORDS.max_wheel_deviation_sigmas * RECORDS.wheel_prior_sigma,
+    ) && is_near(
+        model.separation_m,
+        nominal.separation_m,
+        RECORDS.max_separation_deviation_sigmas * RECORDS.separation_prior_sigma,
+    )
 }
 
 /// By which factor the wheels of a fit are too large or too small for the robot that its description tells
@@ -239,7 +245,7 @@ fn has_stated_geometry(fit: &ModelFit<'_>) -> bool {
 pub(crate) fn wrong_wheels(fit: &ModelFit<'_>) -> Option<f64> {
     let ratio = fit.solution.model.m_per_rad.zip_with(fit.nominal.m_per_rad, |found, nominal| found / nominal);
     let factor = (ratio.left * ratio.right).sqrt();
-    (factor.ln().abs() > WRONG_WHEELS_FACTOR.ln()).then_some(factor)
+    (factor.ln().abs() > RECORDS.wrong_wheels_factor.ln()).then_some(factor)
 }
 
 /// A form of a fault.
@@ -257,7 +263,7 @@ struct Form {
 /// Whether two sessions' rewritings undo the same fault. How often it strikes may differ.
 fn is_same(a: &[(&'static str, f64)], b: &[(&'static str, f64)]) -> bool {
     let same = |(a, b): (&(&str, f64), &(&str, f64))| {
-        a.0 == b.0 && (a.0 == "probability" || (a.1 - b.1).abs() <= FACTOR_TOLERANCE * a.1.abs())
+        a.0 == b.0 && (a.0 == "probability" || (a.1 - b.1).abs() <= RECORDS.factor_tolerance * a.1.abs())
     };
     a.len() == b.len() && a.iter().zip(b).all(same)
 }

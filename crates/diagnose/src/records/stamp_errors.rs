@@ -12,8 +12,7 @@ use crate::fits::model_comparison::log_bayes_factor;
 use crate::fits::statistics::p_of_chi_square;
 use crate::fits::wald::{Test, cluster_robust_test, wald_test};
 use crate::records::record_faults::sessions;
-use crate::settings::levels::{CLUSTER_ROBUST_LEVEL, MIN_LOG_ODDS_MARGIN, SCAN_LEVEL};
-use crate::settings::records::{MAX_RESTAMPING_LOSS, MIN_SHARE_SIGMAS, MIN_WHOLE_RESTAMPING_LOG_ODDS};
+use crate::settings::{LEVELS, RECORDS};
 
 /// An error of the stamps, and the records without it.
 pub(crate) struct StampError {
@@ -49,7 +48,8 @@ impl StampError {
     pub(crate) fn is_undone_by(&self, restamped: &ModelFit<'_>) -> bool {
         let Some(explained) = &self.explained else { return true };
         let most = explained.count.max(count(restamped));
-        cost(restamped, most) <= explained.cost + MIN_LOG_ODDS_MARGIN.max(MAX_RESTAMPING_LOSS * explained.by)
+        cost(restamped, most)
+            <= explained.cost + LEVELS.min_log_odds_margin.max(RECORDS.max_restamping_loss * explained.by)
     }
 }
 
@@ -74,7 +74,7 @@ pub(crate) fn stamp_error_by_counts(datasets: &[Dataset], catalogue: &[Candidate
     catalogue.iter().find_map(|candidate| {
         let (restamped, shown_by_counts) = (candidate.restamped()?, candidate.shown_by_counts()?);
         let (value, sigma) = shown_by_counts(datasets)?;
-        if value - MIN_SHARE_SIGMAS * sigma < 0.5 {
+        if value - RECORDS.min_share_sigmas * sigma < 0.5 {
             return None;
         }
         let each: Option<Vec<Dataset>> = datasets.iter().map(|dataset| restamped(dataset, value, sigma)).collect();
@@ -114,7 +114,9 @@ pub(crate) fn stamp_error(datasets: &[Dataset], base: &ModelFit<'_>, catalogue: 
         let model = refit(base, &alone, vec![candidate.clone()])?;
         let (test, _) = wald_test(&model, 0)?;
         let &[(value, sigma)] = &test.estimates[..] else { return None };
-        if test.p_value * catalogue.len() as f64 > SCAN_LEVEL || !cluster_robust_test(&model, 0, CLUSTER_ROBUST_LEVEL) {
+        if test.p_value * catalogue.len() as f64 > LEVELS.scan_level
+            || !cluster_robust_test(&model, 0, LEVELS.cluster_robust_level)
+        {
             return None;
         }
         let each: Vec<Option<Dataset>> = datasets.iter().map(|dataset| restamped(dataset, value, sigma)).collect();
@@ -156,7 +158,7 @@ pub(crate) fn whole_stamp_error(
         };
         let explains = cost(base, count) - cost_on_beat;
         let log_odds = explains - (catalogue.len() as f64).ln();
-        if log_odds < MIN_WHOLE_RESTAMPING_LOG_ODDS {
+        if log_odds < RECORDS.min_whole_restamping_log_odds {
             return None;
         }
         let statistic = 2.0 * explains;

@@ -19,7 +19,7 @@ use self::events::{Event, Limits};
 use self::other_extrinsics::{OtherExtrinsics, other_extrinsics};
 use crate::records::names::run_name;
 use crate::records::pose_windows::{CalibratedTracks, PoseTrack};
-use crate::settings::records::{MAX_UNKNOWN_EVENTS_PER_RUN, MAX_UNKNOWN_SHARE};
+use crate::settings::RECORDS;
 use rules::Rule;
 
 /// What does not belong, where, and by how much.
@@ -73,8 +73,8 @@ pub(crate) fn unknown_motions(
     let minutes: f64 = tracks.iter().map(|track| (track.t_s[track.len() - 1] - track.t_s[0]) / 60.0).sum();
     let spoiled: usize = events.iter().map(|(_, event)| event.poses.len() - 1).sum();
     if !with_events
-        || spoiled as f64 > MAX_UNKNOWN_SHARE * pairs as f64
-        || events.len() as f64 > MAX_UNKNOWN_EVENTS_PER_RUN * minutes.max(tracks.len() as f64)
+        || spoiled as f64 > RECORDS.max_unknown_share * pairs as f64
+        || events.len() as f64 > RECORDS.max_unknown_events_per_run * minutes.max(tracks.len() as f64)
     {
         events.clear();
     }

@@ -19,14 +19,14 @@ use crate::records::part_of_runs::part_of_runs;
 use crate::records::record_faults::sessions;
 use crate::search::selection::{SearchResult, search};
 use crate::search::sparse_terms::{SparseSearch, UncataloguedTerms, sparse};
-use crate::settings::levels::{MIN_LOG_ODDS_MARGIN, SCAN_LEVEL, SPARSE_TERM_LEVEL};
-use crate::settings::search::{AUTOCORRELATION_SIGMAS, MIN_AUTOCORRELATION, SCAN_LEVEL_IF_DEPENDENT};
+use crate::settings::{LEVELS, SEARCH};
 
 pub(crate) const THINNED: FitSettings = FitSettings { nuisances: false, thin: true, thin_displacements: true };
 
 fn is_white(checked: &Checked) -> bool {
     let (coefficient, sigmas) = checked.correlation;
-    coefficient.abs() < MIN_AUTOCORRELATION || (sigmas.abs() < AUTOCORRELATION_SIGMAS && !checked.autocorrelated)
+    coefficient.abs() < SEARCH.min_autocorrelation
+        || (sigmas.abs() < SEARCH.autocorrelation_sigmas && !checked.autocorrelated)
 }
 
 /// The mean model after the search: the effects found, uncatalogued terms, and the tests of the residuals
@@ -107,9 +107,8 @@ struct Searched<'a> {
 fn search_and_thin<'a>(datasets: &'a [Dataset], base: ModelFit<'a>, catalogue: &[Candidate]) -> Searched<'a> {
     let among_all = search_among_all(base, catalogue);
     let lasting = among_all.lasting_correlation().filter(|_| Rule::ThinIfAutocorrelated.applies(true));
-    let thinned = lasting.and_then(|lasting| {
-        Some((thinned_beside(datasets, &among_all.base, &among_all.model.found.model)?, lasting))
-    });
+    let thinned = lasting
+        .and_then(|lasting| Some((thinned_beside(datasets, &among_all.base, &among_all.model.found.model)?, lasting)));
     match thinned {
         Some((thinned, correlation)) => {
             drop(among_all); // its fits are large
@@ -186,12 +185,12 @@ fn correlation_by_part(datasets: &[Dataset], base: &ModelFit<'_>, catalogue: &[C
 /// The effects beside a base fit. Where instants are noisy beside them, the base fit with that noise, and the
 /// effects beside it: motion that stamps do not tell resembles effects that grow with speed.
 fn search_beside_timing_noise<'a>(base: ModelFit<'a>, catalogue: &[Candidate]) -> (ModelFit<'a>, MeanModel<'a>) {
-    let found = search(FitCache::of(&base), catalogue, SCAN_LEVEL);
+    let found = search(FitCache::of(&base), catalogue, LEVELS.scan_level);
     match Rule::TimingNoise.finds(noisy_base(&base, &found.model)) {
         None => (base, MeanModel::of_effects(found)),
         Some(noisy) => {
             drop((base, found)); // their fits are large
-            let found = search(FitCache::of(&noisy), catalogue, SCAN_LEVEL);
+            let found = search(FitCache::of(&noisy), catalogue, LEVELS.scan_level);
             (noisy, MeanModel::of_effects(found))
         }
     }
@@ -216,7 +215,7 @@ fn compare_with_sparse<'a>(base: &ModelFit<'a>, model: MeanModel<'a>) -> MeanMod
     let without = AugmentedModel::base(base);
     let Some(sparse_search) = SparseSearch::beside(1.0, base, &without) else { return model };
     let named = log_bayes_factor(&without.fit, &model.found.model);
-    let finding = sparse_search.finding(SPARSE_TERM_LEVEL);
+    let finding = sparse_search.finding(LEVELS.sparse_term_level);
     let Some(likeliest) = finding.as_ref().map(|found| &found.model).or_else(|| sparse_search.likeliest()) else {
         return model;
     };
@@ -225,13 +224,14 @@ fn compare_with_sparse<'a>(base: &ModelFit<'a>, model: MeanModel<'a>) -> MeanMod
     let more = unnamed + finding::uncatalogued_log_odds() - named;
     let margin = margin_over_units(named, likeliest, &model.found.model);
     let Some(term) = finding.filter(|_| Rule::TermInstead.applies(more > margin)) else {
-        let is_close = Rule::CompetingTerm.applies(more > -MIN_LOG_ODDS_MARGIN);
+        let is_close = Rule::CompetingTerm.applies(more > -LEVELS.min_log_odds_margin);
         let competing = Some(odds_within(more, margin).min(1.0)).filter(|_| is_close);
         return MeanModel { competing, ..model };
     };
     let instead = UncataloguedTerms::from(base, term);
     let log_bayes_factor_instead = instead.log_bayes_factor(&without.fit);
-    let beside = sparse(base, &model.found.model, SPARSE_TERM_LEVEL).map(|term| UncataloguedTerms::from(base, term));
+    let beside =
+        sparse(base, &model.found.model, LEVELS.sparse_term_level).map(|term| UncataloguedTerms::from(base, term));
     match beside.filter(|beside| beside.log_bayes_factor(&without.fit) >= log_bayes_factor_instead) {
         Some(beside) => model.with_terms(beside),
         None => MeanModel { found: model.found.without_effects(without), ..model }.with_terms(instead),
@@ -244,7 +244,7 @@ fn search_if_dependent<'a>(model: MeanModel<'a>, catalogue: &[Candidate]) -> Mea
     if model.unlisted.is_some() || !model.shows_dependence() {
         return model;
     }
-    let found = search(model.found.known.clone(), catalogue, SCAN_LEVEL_IF_DEPENDENT);
+    let found = search(model.found.known.clone(), catalogue, SEARCH.scan_level_if_dependent);
     let is_more = found.model.candidates.len() > model.found.model.candidates.len();
     if !Rule::SearchIfDependent.applies(is_more) {
         return model;
@@ -258,7 +258,7 @@ fn terms_if_dependent<'a>(base: &ModelFit<'a>, model: MeanModel<'a>) -> MeanMode
     if model.unlisted.is_some() || !model.shows_dependence() {
         return model;
     }
-    match Rule::TermsIfDependent.finds(sparse(base, &model.found.model, SPARSE_TERM_LEVEL)) {
+    match Rule::TermsIfDependent.finds(sparse(base, &model.found.model, LEVELS.sparse_term_level)) {
         Some(term) => model.with_terms(UncataloguedTerms::from(base, term)),
         None => model,
     }

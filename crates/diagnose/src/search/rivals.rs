@@ -14,10 +14,7 @@ use crate::fits::fit_cache::FitCache;
 use crate::fits::model_comparison::{log_odds_margin, occam_factor, relative_odds};
 use crate::fits::wald::wald_test;
 use crate::search::ranking::Entry;
-use crate::settings::search::{
-    CLOSE_RIVAL_FRACTION, CLOSE_RIVAL_STATISTIC, MAX_CLOSE_RIVALS, MAX_FURTHER_VARIANTS, MAX_RIVALS,
-    MIN_RIVAL_STATISTIC_RATIO,
-};
+use crate::settings::SEARCH;
 
 /// Why a candidate whose score is significant is not in the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -111,7 +108,7 @@ pub(crate) fn rivals<'a>(
         fits.iter().filter(is_its).any(is_possible)
     };
     contenders.retain(|entry| entry.scored.statistic >= close && !can_be(&fits, entry));
-    for variant in 0..MAX_FURTHER_VARIANTS {
+    for variant in 0..SEARCH.max_further_variants {
         let next: Vec<Candidate> =
             contenders.iter().filter_map(|entry| entry.others(close).nth(variant)).cloned().collect();
         if Rule::FurtherVariants.finds(next.first()).is_none() {
@@ -164,22 +161,22 @@ pub(crate) fn rivals<'a>(
 
 /// The score statistic from which on a candidate is a close rival of the best.
 fn close_statistic(best: f64) -> f64 {
-    best - CLOSE_RIVAL_STATISTIC.max(CLOSE_RIVAL_FRACTION * best)
+    best - SEARCH.close_rival_statistic.max(SEARCH.close_rival_fraction * best)
 }
 
 /// The candidates that are refitted, by their scores: those that explain enough, most probable first, and
 /// no more of them than are worth it; close rivals beyond that.
 fn contenders(entries: &[Entry], best: f64) -> Vec<&Entry> {
     let close = close_statistic(best);
-    let least = close.min(MIN_RIVAL_STATISTIC_RATIO * best);
+    let least = close.min(SEARCH.min_rival_statistic_ratio * best);
     let mut ranked: Vec<&Entry> =
         entries.iter().filter(|entry| entry.scored.dimensions > 0 && entry.scored.statistic >= least).collect();
     ranked.sort_by(|a, b| b.scored.log_odds.total_cmp(&a.scored.log_odds));
     let refitted = ranked.into_iter().enumerate();
     refitted
-        .filter(|(rank, entry)| *rank < MAX_RIVALS || entry.scored.statistic >= close)
+        .filter(|(rank, entry)| *rank < SEARCH.max_rivals || entry.scored.statistic >= close)
         .map(|(_, entry)| entry)
-        .take(MAX_CLOSE_RIVALS)
+        .take(SEARCH.max_close_rivals)
         .collect()
 }
 

@@ -1,6 +1,5 @@
 //! Forward selection over the catalogue with refits, and the causes that the data do not discriminate.
 
-use estimation::ModelFit;
 use rules::Rule;
 
 use crate::candidates::candidate::Candidate;
@@ -19,8 +18,7 @@ use crate::fits::wald::{Test, cluster_robust_test, p_value_over, tests_of, wald_
 use crate::gain::gain;
 use crate::search::ranking::{Entry, best_variants, tests_in};
 use crate::search::rivals::{Name, Refusal, Refusals, over_names, rivals};
-use crate::settings::levels::{CLUSTER_ROBUST_LEVEL, MAX_EFFECTS, SCAN_LEVEL, TURN_SCATTER_LEVEL};
-use crate::settings::search::{MAX_CANDIDATES_TRIED, MAX_DRIFT_INCREASE_INTERVALS};
+use crate::settings::{LEVELS, SEARCH};
 
 /// What the search found.
 #[derive(Debug, Clone)]
@@ -30,9 +28,6 @@ pub(crate) struct SearchResult<'a> {
     pub(crate) names: Vec<Vec<Name>>,
     /// For each candidate, its test at the end, in the presence of the others.
     pub(crate) tests: Vec<Test>,
-    /// For each candidate, the standard deviation that uncertain variants and causes add to each of its
-    /// sizes.
-    extra_sigma: Vec<Vec<f64>>,
     /// The first scan, effect by effect.
     pub(crate) first_scan: Vec<Entry>,
     /// Why significant candidates are not in the model.
@@ -57,7 +52,7 @@ fn grown<'a>(
     refusals: &mut Refusals,
 ) -> Option<AugmentedModel<'a>> {
     let (tests, index) = (tests_in(&entries), model.candidates.len());
-    for _ in 0..MAX_CANDIDATES_TRIED {
+    for _ in 0..SEARCH.max_candidates_tried {
         let best = most_significant(&entries, tests, level).or_else(|| {
             Rule::SignificantOnceRefitted.finds(significant_once_refitted(known, model, &entries, (tests, level)))
         })?;
@@ -182,8 +177,8 @@ fn confirm(
     }
     // Nor is an effect of a few runs. Where turns scatter from run to run, everything correlated with turns
     // seems significant: it must be significant over the runs alone.
-    let scattered = differs_from_run_to_run(extended) < TURN_SCATTER_LEVEL;
-    if Rule::OverRuns.applies(!cluster_robust_test(extended, index, CLUSTER_ROBUST_LEVEL)) {
+    let scattered = differs_from_run_to_run(extended) < LEVELS.turn_scatter_level;
+    if Rule::OverRuns.applies(!cluster_robust_test(extended, index, LEVELS.cluster_robust_level)) {
         return Err(Refusal::NotOverRuns);
     }
     let fails_there = scattered && !cluster_robust_test(extended, index, level / tests);
@@ -234,7 +229,7 @@ pub(crate) fn search<'a>(mut known: FitCache<'a>, catalogue: &[Candidate], level
     let mut first_scan = Vec::new();
     let mut names: Vec<Vec<Name>> = Vec::new();
     let mut beside = Vec::new();
-    while model.candidates.len() < MAX_EFFECTS {
+    while model.candidates.len() < LEVELS.max_effects {
         let mut entries = best_variants(known.beside(&model, catalogue));
         if model.candidates.is_empty() {
             first_scan.clone_from(&entries);
@@ -270,7 +265,7 @@ pub(crate) fn search<'a>(mut known: FitCache<'a>, catalogue: &[Candidate], level
             if Rule::PredictsWorse.applies(gain.predicts_worse()) {
                 return Some(Refusal::PredictsWorse);
             }
-            let drifts_more = Rule::DriftsMore.applies(gain.drifts_more_by(MAX_DRIFT_INCREASE_INTERVALS));
+            let drifts_more = Rule::DriftsMore.applies(gain.drifts_more_by(SEARCH.max_drift_increase_intervals));
             drifts_more.then_some(Refusal::DriftsMore)
         });
         // Where no cause that replaced it is significant either, it is not confirmed.
@@ -316,7 +311,7 @@ pub(crate) fn search<'a>(mut known: FitCache<'a>, catalogue: &[Candidate], level
             extra_sigma.remove(index);
         }
     }
-    SearchResult { tests: tests_of(&model, &extra_sigma), model, names, extra_sigma, first_scan, refusals, known }
+    SearchResult { tests: tests_of(&model, &extra_sigma), model, names, first_scan, refusals, known }
 }
 
 #[cfg(test)]

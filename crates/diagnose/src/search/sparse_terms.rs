@@ -16,8 +16,7 @@ use crate::fits::scan::{Scored, scan};
 use crate::fits::statistics::{p_of_chi_square, sidak};
 use crate::fits::wald::wald_test;
 use crate::gain::gain;
-use crate::settings::levels::SPARSE_TERM_LEVEL;
-use crate::settings::search::{MAX_SPARSE_REFITS, MAX_SPARSE_TERMS};
+use crate::settings::{LEVELS, SEARCH};
 
 /// A sparse term with its model.
 pub(crate) struct FoundTerm<'a> {
@@ -25,11 +24,6 @@ pub(crate) struct FoundTerm<'a> {
     pub(crate) p_value: f64,
     /// How many products were tried.
     pub(crate) trials: usize,
-    /// Its gain on held-out runs is more than two half-widths of the 95 % interval above zero;
-    /// autocorrelated measurements, which differ from run to run, do not reach that.
-    pub(crate) certain: bool,
-    /// Measurements are likelier with it, but odometry drifts more: it stands for something else.
-    pub(crate) drifts_more: bool,
 }
 
 /// Log of the trials of a sparse term.
@@ -48,8 +42,8 @@ impl<'a> UncataloguedTerms<'a> {
     /// A term that was found, and further ones beside it.
     pub(crate) fn from(base: &ModelFit<'a>, first: FoundTerm<'a>) -> Self {
         let mut all = Self { model: first.model, tried: vec![(first.p_value, first.trials)] };
-        while all.tried.len() < MAX_SPARSE_TERMS
-            && let Some(next) = sparse(base, &all.model, SPARSE_TERM_LEVEL)
+        while all.tried.len() < SEARCH.max_sparse_terms
+            && let Some(next) = sparse(base, &all.model, LEVELS.sparse_term_level)
         {
             all.model = next.model;
             all.tried.push((next.p_value, next.trials));
@@ -179,7 +173,7 @@ impl<'m, 'a> SparseSearch<'m, 'a> {
     pub(crate) fn beside(level: f64, base: &ModelFit<'a>, model: &'m AugmentedModel<'a>) -> Option<Self> {
         // No finding is asked for at a higher level.
         let scored = scan(&model.fit, &model.candidates, &library(base));
-        let (scored, p_value) = best_first(model, scored, (level, SPARSE_TERM_LEVEL))?;
+        let (scored, p_value) = best_first(model, scored, (level, LEVELS.sparse_term_level))?;
         let trials = scored.len();
         if p_value > level {
             return None;
@@ -188,39 +182,33 @@ impl<'m, 'a> SparseSearch<'m, 'a> {
             refit(base, model, [&model.candidates[..], std::slice::from_ref(&scored.candidate)].concat())
                 .filter(|extended| keeps_wheels(&model.fit, &extended.fit) && !effects_cancel(extended))
         };
-        Some(Self { model, p_value, trials, refitted: refit_each(&scored[..MAX_SPARSE_REFITS.min(trials)], with) })
+        Some(Self {
+            model,
+            p_value,
+            trials,
+            refitted: refit_each(&scored[..SEARCH.max_sparse_refits.min(trials)], with),
+        })
     }
 
     /// The best of them that predicts held-out runs better, if the best is significant by its score, and
     /// unless odometry drifts more with it.
     pub(crate) fn finding(&self, level: f64) -> Option<FoundTerm<'a>> {
-        self.best_prediction(level).filter(|term| !term.drifts_more)
-    }
-
-    /// The same, whether odometry drifts more with it or not.
-    pub(crate) fn best_prediction(&self, level: f64) -> Option<FoundTerm<'a>> {
         if self.p_value > level {
             return None;
         }
         let predicting = self.refitted.iter().filter_map(|extended| {
             let earned = gain(self.model, extended).ok()?;
             let score = earned.log_score_per_observation;
-            let certain = score.low + score.high > 2.0 * (score.high - score.low);
-            (score.low > 0.0).then_some((score.extended, extended, certain, earned.drifts_more()))
+            (score.low > 0.0).then_some((score.extended, extended, earned.drifts_more()))
         });
-        let (_, extended, certain, drifts_more) = predicting.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        // What is no more than the error of a larger effect's form is none beside it.
+        let best = predicting.max_by(|a, b| a.0.total_cmp(&b.0));
+        let (_, extended, _) = best.filter(|(.., drifts_more)| !drifts_more)?;
+        // What is no more than the error of a larger effect's form is none.
         let (test, _) = wald_test(extended, self.model.candidates.len())?;
         // As many parameters as observations leave no scatter, and a size without one is not determined.
         let is_determined = test.estimates.iter().all(|(_, sigma)| sigma.is_finite());
         let is_found = is_determined && test.statistic >= form_error_statistic(self.model);
-        is_found.then(|| FoundTerm {
-            model: extended.clone(),
-            p_value: self.p_value,
-            trials: self.trials,
-            certain,
-            drifts_more,
-        })
+        is_found.then(|| FoundTerm { model: extended.clone(), p_value: self.p_value, trials: self.trials })
     }
 
     /// The likeliest of them.
@@ -244,7 +232,7 @@ pub(crate) fn best_first(
 ) -> Option<(Vec<Scored>, f64)> {
     scored.retain(|scored| scored.dimensions > 0);
     scored.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
-    let best = (2 * MAX_SPARSE_REFITS).min(scored.len());
+    let best = (2 * SEARCH.max_sparse_refits).min(scored.len());
     // Of fewer trials the best is more significant.
     if sidak(scored.first()?.p_value, (scored.len() - best).max(1)) <= asked {
         let unresolved = unresolved(&model.fit, &model.candidates, &scored[..best]);
@@ -263,7 +251,7 @@ pub(crate) fn best_first(
 
 /// Takes the statistics of the best over what coarse encoders inflate them by, and puts them in order again.
 fn deflate_best(null: &NullDistribution<'_, '_>, scored: &mut [Scored]) {
-    let best = MAX_SPARSE_REFITS.min(scored.len());
+    let best = SEARCH.max_sparse_refits.min(scored.len());
     let parts: Vec<&[Candidate]> = scored[..best].iter().map(|of| std::slice::from_ref(&of.candidate)).collect();
     let inflation = null.inflation(&parts);
     for (scored, inflation) in scored.iter_mut().zip(inflation) {

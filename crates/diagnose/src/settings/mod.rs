@@ -12,3 +12,14 @@ pub(crate) mod plan;
 pub(crate) mod records;
 pub(crate) mod residuals;
 pub(crate) mod search;
+
+rules::rooms! {
+    carry_over: carry_over::CarryOver as CARRY_OVER,
+    findings: findings::Findings as FINDINGS,
+    large_log: large_log::LargeLog as LARGE_LOG,
+    levels: levels::Levels as LEVELS,
+    plan: plan::Plan as PLAN,
+    records: records::Records as RECORDS,
+    residuals: residuals::Residuals as RESIDUALS,
+    search: search::Search as SEARCH,
+}

@@ -230,12 +230,12 @@ fn likelihoods_are_averaged_over_scales_and_no_error_speaks_against_a_cause_by_m
 #[test]
 fn any_error_has_two_scales_and_displacements_may_err_alone() {
     let mut of = response(3.0, &[(AT, 1.0)]);
-    let scales = MEASUREMENT_ERROR_SCALES.len().pow(2);
+    let scales = RESIDUALS.measurement_error_scales.len().pow(2);
     let number = |source, of: &ErrorResponse| of_any(source, std::slice::from_ref(of)).len();
     assert_eq!((number(ErrorSource::Robot, &of), number(ErrorSource::Instrument, &of)), (scales, scales));
     of.large.is_displacement = true;
     assert_eq!((number(ErrorSource::Robot, &of), number(ErrorSource::Instrument, &of)), (scales, 2 * scales));
-    let [m, rad] = [MEASUREMENT_ERROR_SCALES[0], MEASUREMENT_ERROR_SCALES[1]];
+    let [m, rad] = [RESIDUALS.measurement_error_scales[0], RESIDUALS.measurement_error_scales[1]];
     let all = of_any(ErrorSource::Robot, std::slice::from_ref(&of));
     assert_eq!(all[1], [of.error(ANY, m, rad)]);
     assert!(of_cause("slip_speed", &[of.clone()], 0.2).is_none());

@@ -69,7 +69,7 @@ fn a_planned_run_drives_its_program() {
             assert!((end.theta_rad().expect("a heading") - turned).abs() < 1e-9, "{program:?}: {end:?}");
             let driving_s =
                 60.0 * setting.drive_limits(manoeuvre.speed_m_s).cost(&program).minutes - setting.handling_s;
-            let over_s = run.odometry.t_s.last().expect("rows") - driving_s - 2.0 * STANDSTILL_S;
+            let over_s = run.odometry.t_s.last().expect("rows") - driving_s - 2.0 * PLAN.standstill_s;
             assert!((-1e-9..=setting.between_rows_s + 1e-9).contains(&over_s), "{program:?}: {over_s} s more");
             let WheelLog::Angles(angles) = &run.odometry.wheels else { panic!("angles are logged") };
             for side in [&angles.left, &angles.right] {

@@ -6,11 +6,7 @@ use dataset::quantile;
 use kinematics::{Pose, wrap_to_pi};
 
 use crate::records::pose_windows::{CalibratedTracks, Residual};
-use crate::settings::records::{
-    IMPLAUSIBLE_SPEED_RATIO, MAX_UNDONE_S, MIN_OTHER_EXTRINSICS_SEPARATIONS, MIN_SURROUNDING_SIGMAS,
-    MIN_UNKNOWN_ACROSS_SEPARATIONS, MIN_UNKNOWN_ALONG_SEPARATIONS, MIN_UNKNOWN_SIGMAS, MIN_UNKNOWN_TURN_RAD,
-    MIN_WINDOW_SIGMA, WINDOW_SPANS,
-};
+use crate::settings::RECORDS;
 
 /// What moved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -56,25 +52,26 @@ impl Limits {
                 }
             }
             // 0.9 of a normal variable is within 1.645 standard deviations.
-            let sigma =
-                |all: Vec<f64>| quantile(all, 0.9).map_or(f64::INFINITY, |of| (of / 1.645).max(MIN_WINDOW_SIGMA));
+            let sigma = |all: Vec<f64>| {
+                quantile(all, 0.9).map_or(f64::INFINITY, |of| (of / 1.645).max(RECORDS.min_window_sigma))
+            };
             let [along, across, turn] = all.map(sigma);
             Residual::new(along, across, turn)
         };
         let least = Residual::new(
-            MIN_UNKNOWN_ALONG_SEPARATIONS * separation_m,
-            MIN_UNKNOWN_ACROSS_SEPARATIONS * separation_m,
-            MIN_UNKNOWN_TURN_RAD,
+            RECORDS.min_unknown_along_separations * separation_m,
+            RECORDS.min_unknown_across_separations * separation_m,
+            RECORDS.min_unknown_turn_rad,
         );
         let (speed_m_s, rate_rad_s) = if tick_s > 0.0 { brisk_rates(calibrated) } else { (0.0, 0.0) };
         let by_a_tick = tick_s * Residual::new(speed_m_s, speed_m_s, rate_rad_s);
-        let place_m = MIN_OTHER_EXTRINSICS_SEPARATIONS * separation_m;
-        Self { least: least + by_a_tick, place_m, sigmas: WINDOW_SPANS.iter().map(of_span).collect() }
+        let place_m = RECORDS.min_other_extrinsics_separations * separation_m;
+        Self { least: least + by_a_tick, place_m, sigmas: RECORDS.window_spans.iter().map(of_span).collect() }
     }
 
     /// Standard deviations of a residual that is beyond wheels.
     fn excess(&self, residual: &Residual, sigma: &Residual) -> Option<f64> {
-        self.excess_of(residual, sigma, MIN_UNKNOWN_SIGMAS)
+        self.excess_of(residual, sigma, RECORDS.min_unknown_sigmas)
     }
 
     /// The same where it takes so many.
@@ -103,12 +100,14 @@ impl Limits {
         displacement: &'a Residual,
     ) -> impl Iterator<Item = (usize, usize)> + 'a {
         let of = &calibrated.tracks[track];
-        let longer = WINDOW_SPANS.into_iter().map(move |poses| (from.checked_sub(poses), to + poses));
+        let longer = RECORDS.window_spans.into_iter().map(move |poses| (from.checked_sub(poses), to + poses));
         let within = move |(before, after): &(usize, usize)| {
             let around_s = (of.t_s[from] - of.t_s[*before]).max(of.t_s[*after] - of.t_s[to]);
-            let sigma = WINDOW_SPANS.iter().zip(&self.sigmas).find(|(span, _)| **span >= after - before);
-            around_s < MAX_UNDONE_S
-                && sigma.is_some_and(|(_, sigma)| self.excess_of(displacement, sigma, MIN_SURROUNDING_SIGMAS).is_some())
+            let sigma = RECORDS.window_spans.iter().zip(&self.sigmas).find(|(span, _)| **span >= after - before);
+            around_s < RECORDS.max_undone_s
+                && sigma.is_some_and(|(_, sigma)| {
+                    self.excess_of(displacement, sigma, RECORDS.min_surrounding_sigmas).is_some()
+                })
         };
         longer.filter_map(move |(before, after)| Some((before?, after)).filter(|_| after < of.len())).take_while(within)
     }
@@ -119,7 +118,7 @@ impl Limits {
         let of_track = calibrated.tracks[track].len();
         let mut found: Vec<Event> = Vec::new();
         let mut tried: Vec<Range<usize>> = Vec::new();
-        for (span, sigma) in WINDOW_SPANS.into_iter().zip(&self.sigmas) {
+        for (span, sigma) in RECORDS.window_spans.into_iter().zip(&self.sigmas) {
             let mut stretches: Vec<Range<usize>> = Vec::new();
             for from in 0..of_track.saturating_sub(span) {
                 let is_tried = tried.iter().any(|range| from < range.end - 1 && range.start < from + span);
@@ -187,6 +186,6 @@ fn is_too_fast(
 ) -> bool {
     let of = &calibrated.tracks[track];
     let fastest = rates(calibrated, track).fold((0.0_f64, 0.0_f64), |most, of| (most.0.max(of.0), most.1.max(of.1)));
-    let time_s = IMPLAUSIBLE_SPEED_RATIO * (of.t_s[to] - of.t_s[from]);
+    let time_s = RECORDS.implausible_speed_ratio * (of.t_s[to] - of.t_s[from]);
     displacement.x.hypot(displacement.y) > fastest.0 * time_s || displacement.z.abs() > fastest.1 * time_s
 }

@@ -5,10 +5,7 @@ use kinematics::{Pose, wrap_to_pi};
 
 use super::events::{AnomalyKind, Event, Limits};
 use crate::records::pose_windows::CalibratedTracks;
-use crate::settings::records::{
-    LASTING_SHARE, MAX_LEAST_EXTRINSICS, MIN_EXTRINSICS, MIN_OTHER_EXTRINSICS_RAD, MIN_OTHER_EXTRINSICS_SIGMAS,
-    MIN_RUNS_PER_ODD_CLOCK,
-};
+use crate::settings::RECORDS;
 
 /// How the instrument is mounted otherwise than in the other runs.
 pub(super) struct OtherExtrinsics {
@@ -27,7 +24,7 @@ pub(super) fn other_extrinsics(
     let of_track = |track: usize| {
         let spoiled: usize = events[track].iter().map(|event| event.poses.len() - 1).sum();
         // What lasts is the mounting's or nobody's.
-        let lasts = spoiled as f64 > LASTING_SHARE * calibrated.tracks[track].len() as f64;
+        let lasts = spoiled as f64 > RECORDS.lasting_share * calibrated.tracks[track].len() as f64;
         let is_taken = |(from, to): (usize, usize)| {
             lasts || events[track].iter().all(|event| to <= event.poses.start || from >= event.poses.end - 1)
         };
@@ -46,7 +43,7 @@ pub(super) fn other_extrinsics(
     };
     let extrinsics: Vec<(usize, Pose, [Pose; 2], [f64; 3])> =
         (0..calibrated.tracks.len()).filter_map(of_track).collect();
-    let least = [limits.place_m, limits.place_m, MIN_OTHER_EXTRINSICS_RAD];
+    let least = [limits.place_m, limits.place_m, RECORDS.min_other_extrinsics_rad];
     let reference = calibrated.body_from_sensor;
     let components = |pose: &Pose| {
         [pose.x_m - reference.x_m, pose.y_m - reference.y_m, wrap_to_pi(pose.theta_rad - reference.theta_rad)]
@@ -59,9 +56,9 @@ pub(super) fn other_extrinsics(
             .map(|(track, pose, halves, sigma)| {
                 (*track, components(pose)[axis], halves.map(|half| components(&half)[axis]), sigma[axis])
             })
-            .filter(|(.., sigma)| MIN_OTHER_EXTRINSICS_SIGMAS * sigma < MAX_LEAST_EXTRINSICS * least)
+            .filter(|(.., sigma)| RECORDS.min_other_extrinsics_sigmas * sigma < RECORDS.max_least_extrinsics * least)
             .collect();
-        if of.len() < MIN_EXTRINSICS {
+        if of.len() < RECORDS.min_extrinsics {
             continue;
         }
         let Some(middle) = median(of.iter().map(|(_, value, ..)| *value)) else { continue };
@@ -73,10 +70,10 @@ pub(super) fn other_extrinsics(
                 halves.iter().all(|half| (half - middle) * (value - middle).signum() > 0.5 * (value - middle).abs())
             })
             .map(|(track, value, _, sigma)| (*track, value - middle, (value - middle).abs() / sigma.max(scatter)))
-            .filter(|(_, off, z)| off.abs() > least && *z > MIN_OTHER_EXTRINSICS_SIGMAS)
+            .filter(|(_, off, z)| off.abs() > least && *z > RECORDS.min_other_extrinsics_sigmas)
             .collect();
         // Where many runs are odd, none is.
-        if odd.len() > (of.len() / MIN_RUNS_PER_ODD_CLOCK).max(1) {
+        if odd.len() > (of.len() / RECORDS.min_runs_per_odd_clock).max(1) {
             continue;
         }
         for (track, off, sigmas) in odd {
