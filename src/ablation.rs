@@ -1,4 +1,5 @@
-//! `--settings FILE`: rules that are switched off, and how often each rule decided.
+//! `--settings FILE`: settings in place of the defaults, rules that are switched off, and how often each rule
+//! decided.
 
 use std::path::{Path, PathBuf};
 
@@ -14,14 +15,18 @@ use crate::terminal::Failure;
 pub(crate) struct Ablation {
     off: Vec<Rule>,
     decisions: Option<PathBuf>,
+    preflight: preflight::settings::Settings,
+    diagnose: diagnose::settings::Settings,
 }
 
 impl Ablation {
-    /// Switches the rules of a file off.
+    /// Takes the settings of a file, and switches its rules off.
     pub(crate) fn begin(file: &Path) -> Result<Self, Failure> {
         let unreadable = |error: toml::de::Error| format!("{}: {}", file.display(), error.message());
         let ablation: Self = toml::from_str(&read_text(file)?).map_err(unreadable)?;
         rules::switch_off(ablation.off.iter().copied())?;
+        preflight::settings::install(ablation.preflight.clone())?;
+        diagnose::settings::install(ablation.diagnose.clone())?;
         Ok(ablation)
     }
 

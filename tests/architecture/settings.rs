@@ -9,8 +9,12 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+use syn::parse::{Parse, ParseStream};
 use syn::visit::{self, Visit};
-use syn::{Attribute, Expr, ExprLit, ExprPath, ImplItemConst, Item, ItemConst, ItemStatic, Lit, Meta, Type};
+use syn::{
+    Attribute, Expr, ExprLit, ExprPath, Ident, ImplItemConst, Item, ItemConst, ItemMacro, ItemStatic, Lit, Meta, Token,
+    Type,
+};
 
 use crate::{files, root, text};
 
@@ -72,25 +76,58 @@ fn split(comment: &str) -> Option<(String, String)> {
     (!meaning.is_empty() && source.ends_with('.')).then(|| (meaning.to_owned(), source.to_owned()))
 }
 
-/// The settings of a file in its order.
+/// The fields of `rules::settings!`, each with its comment.
+struct Fields(Vec<(Ident, Vec<Attribute>)>);
+
+impl Parse for Fields {
+    fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
+        input.parse::<Ident>()?;
+        let mut fields = Vec::new();
+        while !input.is_empty() {
+            let attributes = input.call(Attribute::parse_outer)?;
+            fields.push((input.parse()?, attributes));
+            input.parse::<Token![:]>()?;
+            input.parse::<Type>()?;
+            input.parse::<Token![=]>()?;
+            input.parse::<Expr>()?;
+            input.parse::<Token![,]>()?;
+        }
+        Ok(Self(fields))
+    }
+}
+
+/// The fields that a macro declares; none of another macro.
+fn fields(item: &ItemMacro) -> syn::Result<Vec<(Ident, Vec<Attribute>)>> {
+    let is_of_settings = item.mac.path.segments.last().is_some_and(|last| last.ident == "settings");
+    if is_of_settings { Ok(item.mac.parse_body::<Fields>()?.0) } else { Ok(Vec::new()) }
+}
+
+/// How many settings a macro declares.
+pub(crate) fn settings_of_macro(item: &ItemMacro) -> usize {
+    fields(item).map_or(0, |fields| fields.len())
+}
+
+/// The settings of a file in its order: constants, and fields of `rules::settings!`.
 fn settings(path: &str, source: &str) -> Result<Vec<Setting>, String> {
-    let file = syn::parse_file(source).map_err(|error| format!("{path}: {error}"))?;
+    let unreadable = |error: syn::Error| format!("{path}: {error}");
+    let file = syn::parse_file(source).map_err(unreadable)?;
     let mut found = Vec::new();
     for item in file.items {
-        let Item::Const(item) = item else {
-            if matches!(item, Item::Mod(_) | Item::Use(_)) {
-                continue;
-            }
-            return Err(format!("{path}: settings are constants and nothing else"));
+        let (declared, end) = match item {
+            Item::Const(item) => (vec![(item.ident, item.attrs)], ";\n"),
+            Item::Macro(item) => (fields(&item).map_err(unreadable)?, ",\n"),
+            Item::Mod(_) | Item::Use(_) => continue,
+            _ => return Err(format!("{path}: settings are constants, or fields of a struct, and nothing else")),
         };
-        let name = item.ident.to_string();
-        let (meaning, source_of) = split(&comment(&item.attrs))
-            .ok_or_else(|| format!("{path}: {name} needs unit, meaning, and a last sentence from {ORIGINS:?}"))?;
-        let declared = source.split_once(&format!("const {name}: ")).map(|(_, rest)| rest);
-        let value = declared.and_then(|rest| rest.split_once(" = ")?.1.split_once(";\n"));
-        let value = value.map(|(value, _)| value.split_whitespace().collect::<Vec<_>>().join(" "));
-        let value = value.ok_or_else(|| format!("{path}: {name} has no value"))?;
-        found.push(Setting { name, value, meaning, source: source_of });
+        for (name, attributes) in declared {
+            let (meaning, source_of) = split(&comment(&attributes))
+                .ok_or_else(|| format!("{path}: {name} needs unit, meaning, and a last sentence from {ORIGINS:?}"))?;
+            let declared = source.split_once(&format!(" {name}: ")).map(|(_, rest)| rest);
+            let value = declared.and_then(|rest| rest.split_once(" = ")?.1.split_once(end));
+            let value = value.map(|(value, _)| value.split_whitespace().collect::<Vec<_>>().join(" "));
+            let value = value.ok_or_else(|| format!("{path}: {name} has no value"))?;
+            found.push(Setting { name: name.to_string(), value, meaning, source: source_of });
+        }
     }
     Ok(found)
 }
@@ -146,7 +183,7 @@ impl<'ast> Visit<'ast> for Strays {
             _ => &[],
         };
         let is_test = |attribute: &Attribute| {
-            attribute.path().is_ident("cfg") && attribute.parse_args::<syn::Ident>().is_ok_and(|of| of == "test")
+            attribute.path().is_ident("cfg") && attribute.parse_args::<Ident>().is_ok_and(|of| of == "test")
         };
         if !attributes.iter().any(is_test) {
             visit::visit_item(self, item);
@@ -263,6 +300,10 @@ fn a_setting_without_a_source_is_refused() {
         source: "Tuned: by hand; no record of what on.".to_owned(),
     };
     assert_eq!(settings("settings.rs", sound), Ok(vec![row("T_S", "[1.0, 2.0]")]));
+    let field =
+        "rules::settings! {\n    Times\n    /// Seconds. A time.\n    /// Tuned: by hand.\n    t_s: f64 = 1e-3,\n}\n";
+    assert_eq!(settings("settings.rs", field), Ok(vec![row("t_s", "1e-3")]));
+    assert!(settings("settings.rs", &field.replace("Tuned", "Chosen")).is_err());
     assert!(settings("settings.rs", "/// Seconds. A time.\npub const T_S: f64 = 1.0;\n").is_err());
     assert!(settings("settings.rs", "/// Tuned: by hand.\npub const T_S: f64 = 1.0;\n").is_err());
     assert!(settings("settings.rs", "pub fn f() {}\n").is_err());

@@ -7,7 +7,7 @@ use std::path::Path;
 use syn::visit::{self, Visit};
 use syn::{BinOp, Expr, ExprBinary, ExprLit, Item, Lit};
 
-use crate::settings::is_one_of;
+use crate::settings::{is_one_of, settings_of_macro};
 use crate::{files, root, text};
 
 /// Crates whose code decides about a log.
@@ -62,8 +62,10 @@ fn is_counted_number(of: &Expr) -> bool {
 
 impl<'ast> Visit<'ast> for Found {
     fn visit_item(&mut self, item: &'ast Item) {
-        if let Item::Const(constant) = item {
-            self.constants += usize::from(is_one_of(&NUMERIC, &constant.ty));
+        match item {
+            Item::Const(constant) => self.constants += usize::from(is_one_of(&NUMERIC, &constant.ty)),
+            Item::Macro(item) => self.constants += settings_of_macro(item),
+            _ => {}
         }
         visit::visit_item(self, item);
     }

@@ -18,7 +18,7 @@ mod gain;
 mod plan;
 mod records;
 mod search;
-mod settings;
+pub mod settings;
 mod stage;
 mod text;
 

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use crate::regression::regress;
 use crate::run_log::RunLog;
-use crate::settings::{CLOCK_RATES, CLOCK_STEPS_S, MAX_CLOCK_OFFSET_S, MIN_OVERLAP, MIN_WINDOWS, SMALL_RATE_HALVINGS};
+use crate::settings::CHECKS;
 use crate::windows::{Measured, Window};
 
 /// A clock of the instrument: a stamp t is of the log's instant (t − offset)/(1 + rate).
@@ -68,11 +68,11 @@ impl Explained {
 
 /// Explains displacements and turns, each by a regression of its own.
 pub(crate) fn explain(pairs: &[Paired], measured: Measured, m_per_rad: Wheels<f64>) -> Option<Explained> {
-    if pairs.len() < MIN_WINDOWS {
+    if pairs.len() < CHECKS.min_windows {
         return None;
     }
     let turns: Vec<(Wheels<f64>, f64)> = pairs.iter().filter_map(|pair| pair.turned).collect();
-    let turn = if turns.len() < MIN_WINDOWS { None } else { left_of(&turns) };
+    let turn = if turns.len() < CHECKS.min_windows { None } else { left_of(&turns) };
     let displacement = match measured {
         Measured::Poses => {
             let of = |value: fn(&Window) -> f64| {
@@ -133,7 +133,7 @@ pub(crate) struct Comparison<'a> {
 impl Comparison<'_> {
     pub(crate) fn at(&self, clock: Clock) -> Option<Explained> {
         let pairs = paired(self.windows, self.runs, clock);
-        if (pairs.len() as f64) < MIN_OVERLAP * self.windows.len() as f64 {
+        if (pairs.len() as f64) < CHECKS.min_overlap * self.windows.len() as f64 {
             return None;
         }
         explain(&pairs, self.measured, self.m_per_rad)
@@ -144,7 +144,7 @@ impl Comparison<'_> {
         let mut best: Option<(f64, Explained)> = None;
         let (low_s, high_s) = self.range(within_s)?;
         let (mut from_s, mut to_s) = (low_s, high_s);
-        for step_s in CLOCK_STEPS_S {
+        for step_s in CHECKS.clock_steps_s {
             let count = ((to_s - from_s) / step_s).ceil() as usize;
             let at = |k: usize| {
                 let offset_s = from_s + step_s * k as f64;
@@ -161,7 +161,7 @@ impl Comparison<'_> {
         }
         let (offset_s, explained) = best?;
         // Curvature of the cost: that of a parabola through its neighbours a coarse step away.
-        let step_s = CLOCK_STEPS_S[1];
+        let step_s = CHECKS.clock_steps_s[1];
         let beside = [-step_s, step_s].map(|by_s| self.at(Clock { offset_s: offset_s + by_s, rate: 0.0 }));
         let rise = beside.iter().flatten().map(|found| explained.gain_over(found)).fold(0.0_f64, f64::max);
         let sigma_s = step_s / (2.0 * rise.max(1e-9)).sqrt();
@@ -183,14 +183,14 @@ impl Comparison<'_> {
             high_s = high_s.max(last.to_s - start_s);
         }
         let middle_s = 0.5 * (low_s + high_s);
-        let half_s = (0.5 * (high_s - low_s)).min(MAX_CLOCK_OFFSET_S);
+        let half_s = (0.5 * (high_s - low_s)).min(CHECKS.max_clock_offset_s);
         (low_s <= high_s).then_some((middle_s - half_s, middle_s + half_s))
     }
 
     /// The best rate beside a known offset, with the offset that goes with it: over a grid of rates that turn
     /// the clock about the start of the records or about the middle of the longest, and then in turns.
     pub(crate) fn best_rate(&self, near: Clock) -> Option<(Clock, Explained)> {
-        let [most, step] = CLOCK_RATES;
+        let [most, step] = CHECKS.clock_rates;
         let middle_s = 0.5 * self.windows.iter().map(|window| window.to_s.abs()).fold(0.0, f64::max);
         let mut best: Option<(Clock, Explained)> = None;
         let consider = |clock: Clock, found: Option<Explained>, best: &mut Option<(Clock, Explained)>| {
@@ -203,7 +203,7 @@ impl Comparison<'_> {
         let of_rate =
             |rate: f64| [0.0, near.offset_s, near.offset_s - rate * middle_s].map(|offset_s| Clock { offset_s, rate });
         // In a long log, a small rate makes clocks as far apart as a large one in a short log.
-        let small = (1..=SMALL_RATE_HALVINGS).flat_map(|halvings| {
+        let small = (1..=CHECKS.small_rate_halvings).flat_map(|halvings| {
             let rate = step * 0.5_f64.powi(halvings);
             [-rate, rate]
         });
@@ -211,7 +211,7 @@ impl Comparison<'_> {
         let grid: Vec<Clock> = rates.flat_map(of_rate).collect();
         let all: Vec<_> = grid.into_par_iter().map(|clock| (clock, self.at(clock))).collect();
         all.into_iter().for_each(|(clock, found)| consider(clock, found, &mut best));
-        let (mut step, mut step_s) = (0.5 * step, CLOCK_STEPS_S[1]);
+        let (mut step, mut step_s) = (0.5 * step, CHECKS.clock_steps_s[1]);
         for _ in 0..9 {
             for _ in 0..2 {
                 for by in [-2.0, -1.0, 1.0, 2.0] {

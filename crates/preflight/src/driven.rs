@@ -4,7 +4,7 @@ use dataset::Session;
 use kinematics::Wheels;
 
 use crate::run_log::{RunLog, m_per_rad};
-use crate::settings::{MAX_STRAIGHT_CURVATURE, MAX_WINDOWS, MIN_REVERSAL_RAD, MIN_WINDOWS, WINDOW_S};
+use crate::settings::CHECKS;
 use crate::windows::{Reading, windows};
 
 /// Turns, distance and speed of all runs.
@@ -33,12 +33,12 @@ impl Driven {
             let runs: Vec<RunLog> = session.runs.iter().filter_map(|run| RunLog::of(run, session.robot)).collect();
             let m_per_rad = m_per_rad(session.robot);
             runs.iter().for_each(|run| sum.add(run, session.robot.wheel_separation_m, m_per_rad));
-            sum.is_followed |= windows(&runs, Reading::AS_IS, MAX_WINDOWS).0.len() >= MIN_WINDOWS;
+            sum.is_followed |= windows(&runs, Reading::AS_IS, CHECKS.max_windows).0.len() >= CHECKS.min_windows;
         }
         sum
     }
 
-    /// Adds a run. A turn is reversed where the heading comes back by [`MIN_REVERSAL_RAD`]: less is steering.
+    /// Adds a run. A turn is reversed where the heading comes back by `min_reversal_rad`: less is steering.
     pub(crate) fn add(&mut self, run: &RunLog, separation_m: f64, m_per_rad: Wheels<f64>) {
         let rolled_m = |row: usize| Wheels {
             left: m_per_rad.left * run.wheels.left[row],
@@ -56,20 +56,20 @@ impl Driven {
             let now_rad = heading_rad(row);
             if (now_rad - from_rad).abs() > (farthest_rad - from_rad).abs() {
                 farthest_rad = now_rad;
-            } else if (now_rad - farthest_rad).abs() > MIN_REVERSAL_RAD {
+            } else if (now_rad - farthest_rad).abs() > CHECKS.min_reversal_rad {
                 self.turn(farthest_rad - from_rad);
                 (from_rad, farthest_rad) = (farthest_rad, now_rad);
             }
             let length_s = run.t_s[row] - run.t_s[window];
-            if length_s >= WINDOW_S || row == last {
+            if length_s >= CHECKS.window_s || row == last {
                 let by = rolled_m(row).zip_with(rolled_m(window), |now, before| now - before);
                 let distance_m = 0.5 * (by.left + by.right).abs();
                 let turned_rad = ((by.right - by.left) / separation_m).abs();
                 self.distance_m += distance_m;
-                if turned_rad * separation_m <= MAX_STRAIGHT_CURVATURE * distance_m {
+                if turned_rad * separation_m <= CHECKS.max_straight_curvature * distance_m {
                     self.straight_m += distance_m;
                 }
-                if length_s >= WINDOW_S {
+                if length_s >= CHECKS.window_s {
                     self.fastest_m_s = self.fastest_m_s.max(distance_m / length_s);
                 }
                 window = row;

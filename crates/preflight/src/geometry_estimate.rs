@@ -8,7 +8,7 @@ use kinematics::{Side, Wheels};
 
 use crate::alignment::Paired;
 use crate::regression::{Moments, robustly, slope};
-use crate::settings::{GROUPS, MAX_UNEXPLAINED, MIN_WINDOWS};
+use crate::settings::CHECKS;
 
 /// The drive: metres a radian of each wheel (negative: it counts backwards) and the separation (negative: the
 /// robot turns the other way).
@@ -42,14 +42,14 @@ impl GeometryEstimate {
     /// Of windows with poses; `None` where they do not determine all three.
     pub(crate) fn of(pairs: &[Paired]) -> Option<Self> {
         let whole = Self::once(pairs)?;
-        let group = pairs.len().div_ceil(GROUPS);
-        let without: Vec<Self> = (0..GROUPS)
+        let group = pairs.len().div_ceil(CHECKS.groups);
+        let without: Vec<Self> = (0..CHECKS.groups)
             .filter_map(|number| {
                 let (from, to) = ((number * group).min(pairs.len()), ((number + 1) * group).min(pairs.len()));
                 Self::once(&[&pairs[..from], &pairs[to..]].concat())
             })
             .collect();
-        if without.len() < GROUPS {
+        if without.len() < CHECKS.groups {
             return None;
         }
         let sigma = |of: fn(&Self) -> f64| {
@@ -63,7 +63,7 @@ impl GeometryEstimate {
     }
 
     fn once(pairs: &[Paired]) -> Option<Self> {
-        if pairs.len() < MIN_WINDOWS {
+        if pairs.len() < CHECKS.min_windows {
             return None;
         }
         let of = |value: fn(&Paired) -> Option<f64>| {
@@ -83,7 +83,7 @@ impl GeometryEstimate {
             m_per_rad: Wheels { left: -turn.per_rad.left * separation_m, right: turn.per_rad.right * separation_m },
             separation_m,
             sigma: [0.0; 3],
-            is_diluted: turn.left > MAX_UNEXPLAINED * turn.whole,
+            is_diluted: turn.left > CHECKS.max_unexplained * turn.whole,
             sensor_rad: (sign * y_m).atan2(sign * x_m),
         })
     }

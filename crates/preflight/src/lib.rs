@@ -16,7 +16,7 @@ mod problems;
 mod regression;
 mod run_log;
 mod session_check;
-mod settings;
+pub mod settings;
 mod stages;
 mod start_values;
 mod text;

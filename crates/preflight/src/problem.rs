@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::kind::Kind;
-use crate::settings::PRIOR_LOG_ODDS;
+use crate::settings::CHECKS;
 use crate::text;
 
 /// How bad a problem is.
@@ -44,5 +44,5 @@ impl Problem {
 
 /// Posterior probability of a fault that explains the data better by so many nats.
 pub(crate) fn probability(gain: f64) -> f64 {
-    1.0 / (1.0 + (PRIOR_LOG_ODDS - gain).clamp(-700.0, 700.0).exp())
+    1.0 / (1.0 + (CHECKS.prior_log_odds - gain).clamp(-700.0, 700.0).exp())
 }

@@ -4,7 +4,7 @@
 use dataset::median;
 use kinematics::Wheels;
 
-use crate::settings::{CAUCHY_MEDIANS, COLLINEAR_RATIO, ROBUST_PASSES};
+use crate::settings::CHECKS;
 
 /// A regression's answer.
 #[derive(Debug, Clone, Copy)]
@@ -44,7 +44,7 @@ impl Moments {
     /// Whether both wheels turn in one proportion only; then the direction is (left, right) of length 1.
     pub(crate) fn direction(self) -> Option<Wheels<f64>> {
         let [larger, smaller] = self.eigenvalues();
-        if larger == 0.0 || smaller > COLLINEAR_RATIO * larger {
+        if larger == 0.0 || smaller > CHECKS.collinear_ratio * larger {
             return None;
         }
         let angle = 0.5 * (2.0 * self.lr).atan2(self.ll - self.rr);
@@ -86,7 +86,7 @@ pub(crate) fn regress(pairs: &[(Wheels<f64>, f64)], passes: usize) -> Option<Reg
         let sigma = Wheels { left: (var * inverse.ll).sqrt(), right: (var * inverse.rr).sqrt() };
         found = Some(Regression { per_rad, sigma, left: mean, whole });
         if pass + 1 < passes {
-            let scale = CAUCHY_MEDIANS * median(sizes)? + f64::MIN_POSITIVE;
+            let scale = CHECKS.cauchy_medians * median(sizes)? + f64::MIN_POSITIVE;
             for (weight, pair) in weights.iter_mut().zip(pairs) {
                 *weight = 1.0 / (1.0 + (residual(pair) / scale).powi(2));
             }
@@ -97,7 +97,7 @@ pub(crate) fn regress(pairs: &[(Wheels<f64>, f64)], passes: usize) -> Option<Reg
 
 /// With outliers down-weighted.
 pub(crate) fn robustly(pairs: &[(Wheels<f64>, f64)]) -> Option<Regression> {
-    regress(pairs, ROBUST_PASSES)
+    regress(pairs, CHECKS.robust_passes)
 }
 
 /// Robust slope of one variable on another, with its standard deviation, and mean absolute values of residual
@@ -105,7 +105,7 @@ pub(crate) fn robustly(pairs: &[(Wheels<f64>, f64)]) -> Option<Regression> {
 pub(crate) fn slope(pairs: &[(f64, f64)]) -> Option<(f64, f64, f64, f64)> {
     let mut weights = vec![1.0; pairs.len()];
     let mut found = None;
-    for pass in 0..ROBUST_PASSES {
+    for pass in 0..CHECKS.robust_passes {
         let sums = pairs
             .iter()
             .zip(&weights)
@@ -121,8 +121,8 @@ pub(crate) fn slope(pairs: &[(f64, f64)]) -> Option<(f64, f64, f64, f64)> {
         let var = square / (weights.iter().sum::<f64>() - 1.0).max(1.0);
         let whole = pairs.iter().map(|(_, y)| y.abs()).sum::<f64>() / pairs.len() as f64;
         found = Some((slope, (var / sums.0).sqrt(), left, whole));
-        if pass + 1 < ROBUST_PASSES {
-            let scale = CAUCHY_MEDIANS * median(sizes)? + f64::MIN_POSITIVE;
+        if pass + 1 < CHECKS.robust_passes {
+            let scale = CHECKS.cauchy_medians * median(sizes)? + f64::MIN_POSITIVE;
             for (weight, pair) in weights.iter_mut().zip(pairs) {
                 *weight = 1.0 / (1.0 + (residual(pair) / scale).powi(2));
             }

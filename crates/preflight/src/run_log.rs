@@ -3,7 +3,7 @@
 use dataset::{Displacement, NominalRobot, Protocol, Run, RunSpans, RunView, TruthSample, WheelLog};
 use kinematics::{Side, Wheels};
 
-use crate::settings::GYRO_TURN_SIGMA_RAD;
+use crate::settings::CHECKS;
 
 /// A run's records in one form.
 #[derive(Debug, Clone)]
@@ -77,7 +77,7 @@ fn partial(run: &Run) -> Vec<PartialRow> {
     }
     if let (true, [from_s, .., to_s]) = (run.has_gyro(), &run.odometry.t_s[..]) {
         // A minute of a consumer gyroscope whose bias was seen.
-        rows.push(row(*from_s, *to_s, Part::GyroTurn, GYRO_TURN_SIGMA_RAD));
+        rows.push(row(*from_s, *to_s, Part::GyroTurn, CHECKS.gyro_turn_sigma_rad));
     }
     rows
 }

@@ -7,7 +7,7 @@ use crate::alignment::{Clock, Comparison, Explained, Paired, paired};
 use crate::geometry_estimate::{GeometryEstimate, OneDirection};
 use crate::problem::Problem;
 use crate::run_log::{RunLog, m_per_rad};
-use crate::settings::{MAX_WINDOWS, MIN_WINDOWS};
+use crate::settings::CHECKS;
 use crate::windows::{Measured, Reading, windows};
 
 /// A session with what was found of it.
@@ -52,16 +52,16 @@ impl SessionCheck {
 
     /// The windows with a reading of the instrument's records and a clock.
     pub(crate) fn explained(&self, reading: Reading, clock: Clock) -> Option<Explained> {
-        let (windows, measured) = windows(&self.runs, reading, MAX_WINDOWS);
+        let (windows, measured) = windows(&self.runs, reading, CHECKS.max_windows);
         let comparison = Comparison { windows: &windows, measured, runs: &self.runs, m_per_rad: self.m_per_rad() };
         comparison.at(clock)
     }
 
     /// Windows of a reading and a clock, with the drive that they show.
     pub(crate) fn matched_at(&self, reading: Reading, clock: Clock) -> Option<Matched> {
-        let (windows, measured) = windows(&self.runs, reading, MAX_WINDOWS);
+        let (windows, measured) = windows(&self.runs, reading, CHECKS.max_windows);
         let pairs = paired(&windows, &self.runs, clock);
-        if pairs.len() < MIN_WINDOWS {
+        if pairs.len() < CHECKS.min_windows {
             return None;
         }
         let explained = crate::alignment::explain(&pairs, measured, self.m_per_rad())?;
@@ -73,7 +73,7 @@ impl SessionCheck {
 
     /// Whether the instrument sees positions alone.
     pub(crate) fn measures_positions(&self) -> bool {
-        windows(&self.runs, Reading::AS_IS, MAX_WINDOWS).1 == Measured::Positions
+        windows(&self.runs, Reading::AS_IS, CHECKS.max_windows).1 == Measured::Positions
     }
 
     /// All turning of both wheels, radians.

@@ -9,7 +9,7 @@ use crate::problems::clock::{best_clock, offset_gain};
 use crate::regression::slope;
 use crate::run_log::RunLog;
 use crate::session_check::SessionCheck;
-use crate::settings::{GYRO_WINDOW_S, MAX_START_SIGMA, MIN_WINDOWS};
+use crate::settings::CHECKS;
 use crate::windows::Reading;
 
 /// What the windows of a session's motion say of its clock and of the drive.
@@ -46,7 +46,7 @@ impl StartValues {
             // All negative: an instrument that looks backwards.
             let lengths = [geometry.m_per_rad.left, geometry.m_per_rad.right, geometry.separation_m];
             let is_drive = lengths.iter().all(|of| *of > 0.0) || lengths.iter().all(|of| *of < 0.0);
-            let is_certain = !geometry.is_diluted && geometry.sigma.iter().all(|sigma| *sigma < MAX_START_SIGMA);
+            let is_certain = !geometry.is_diluted && geometry.sigma.iter().all(|sigma| *sigma < CHECKS.max_start_sigma);
             (is_drive && is_certain).then(|| DriveStart {
                 m_per_rad: geometry.m_per_rad.map(f64::abs),
                 wheel_separation_m: geometry.separation_m.abs(),
@@ -68,11 +68,11 @@ fn by_gyro(session: &Session<'_>, check: &SessionCheck) -> Option<DriveStart> {
         let Some(log) = RunLog::of(run, session.robot) else { continue };
         pairs.extend(gyro_windows(run, &log, m_per_rad).unwrap_or_default());
     }
-    if pairs.len() < MIN_WINDOWS {
+    if pairs.len() < CHECKS.min_windows {
         return None;
     }
     let (rad_per_m, sigma, ..) = slope(&pairs)?;
-    (sigma < MAX_START_SIGMA * rad_per_m).then(|| DriveStart {
+    (sigma < CHECKS.max_start_sigma * rad_per_m).then(|| DriveStart {
         m_per_rad,
         wheel_separation_m: rad_per_m.recip(),
         sensor_rad: 0.0,
@@ -86,7 +86,7 @@ fn gyro_windows(run: &RunView<'_>, log: &RunLog, m_per_rad: Wheels<f64>) -> Opti
     let (mut windows, mut from, mut turn_rad) = (Vec::new(), 0, 0.0);
     for row in 1..log.t_s.len().min(rates.len()) {
         turn_rad += rates[row] * (log.t_s[row] - log.t_s[row - 1]);
-        if log.t_s[row] - log.t_s[from] >= GYRO_WINDOW_S {
+        if log.t_s[row] - log.t_s[from] >= CHECKS.gyro_window_s {
             let rolled_m = |angles: &[f64], m: f64| m * (angles[row] - angles[from]);
             let farther_m = rolled_m(&log.wheels.right, m_per_rad.right) - rolled_m(&log.wheels.left, m_per_rad.left);
             if turn_rad.is_finite() {

@@ -3,7 +3,7 @@
 use kinematics::Side;
 
 use crate::kind::{Kind, MirroredAxis};
-use crate::settings::TIME_UNITS;
+use crate::settings::CHECKS;
 
 /// The problem's name in JSON and in docs/check.md.
 pub(crate) const fn id(kind: &Kind) -> &'static str {
@@ -68,7 +68,7 @@ pub(crate) fn sentence(kind: &Kind, runs: Option<&[String]>) -> String {
             let (table, other) = if *of_truth { ("truth.csv", "odometry.csv") } else { ("odometry.csv", "truth.csv") };
             format!(
                 "t_s of {table} is in {}, that of {other} in seconds; divide the times of {table} by {}",
-                TIME_UNIT_NAMES[*unit], TIME_UNITS[*unit]
+                TIME_UNIT_NAMES[*unit], CHECKS.time_units[*unit]
             )
         }
         Kind::ClockOffset { offset_s, sigma_s } => {
@@ -247,7 +247,7 @@ pub(crate) fn fix(kind: &Kind) -> Option<String> {
     match kind {
         Kind::TimeInMilliseconds { .. } => corrections("time_factor = 0.001".to_owned()),
         Kind::TruthTimeUnit { unit, of_truth: true } => {
-            corrections(format!("truth_time_factor = {}", TIME_UNITS[*unit].recip()))
+            corrections(format!("truth_time_factor = {}", CHECKS.time_units[*unit].recip()))
         }
         Kind::ClockOffset { offset_s, .. } => corrections(format!("truth_shift_s = {:.3}", -offset_s)),
         Kind::ClockRate { rate } => corrections(format!("truth_time_factor = {:.5}", 1.0 / (1.0 + rate))),

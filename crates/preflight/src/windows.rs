@@ -10,7 +10,7 @@ use dataset::{TruthSample, quantile};
 use kinematics::{sin_cos, sinc, wrap_to_pi};
 
 use crate::run_log::RunLog;
-use crate::settings::{MAX_WINDOW_S, MAX_WINDOW_TURN_RAD, OUTLYING_MOTION_RATIO, WINDOW_S};
+use crate::settings::CHECKS;
 
 /// How the instrument's records are read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -72,7 +72,7 @@ pub(crate) fn windows(runs: &[RunLog], reading: Reading, most: usize) -> (Vec<Wi
     }
     let usual = |of: fn(&Window) -> f64, windows: &[Window]| quantile(windows.iter().map(of), 0.9).unwrap_or(0.0);
     let speed = |window: &Window| window.ahead_m.hypot(window.left_m) / (window.to_s - window.from_s);
-    let most_m_s = OUTLYING_MOTION_RATIO * usual(speed, &all);
+    let most_m_s = CHECKS.outlying_motion_ratio * usual(speed, &all);
     all.retain(|window| speed(window).is_finite() && (speed(window) <= most_m_s || most_m_s == 0.0));
     if all.len() > most {
         all = spread(all.len(), most).map(|index| all[index]).collect();
@@ -94,10 +94,10 @@ fn pairs(samples: &[TruthSample]) -> impl Iterator<Item = (TruthSample, TruthSam
     std::iter::from_fn(move || {
         while from + 1 < samples.len() {
             let start = samples[from];
-            let found = samples[from + 1..].iter().position(|end| end.t_s >= start.t_s + 0.99 * WINDOW_S);
+            let found = samples[from + 1..].iter().position(|end| end.t_s >= start.t_s + 0.99 * CHECKS.window_s);
             let to = from + 1 + found?;
             from = to;
-            if samples[to].t_s - start.t_s <= MAX_WINDOW_S {
+            if samples[to].t_s - start.t_s <= CHECKS.max_window_s {
                 return Some((start, samples[to]));
             }
         }
@@ -109,7 +109,7 @@ fn of_poses(number: usize, run: &RunLog, reading: Reading, windows: &mut Vec<Win
     for (a, b) in pairs(&run.truth) {
         let (Some(from), Some(to)) = (a.theta_rad(), b.theta_rad()) else { continue };
         let turn_rad = reading.turn_rad(to - from);
-        if turn_rad.abs() > MAX_WINDOW_TURN_RAD {
+        if turn_rad.abs() > CHECKS.max_window_turn_rad {
             continue;
         }
         let (sin, cos) = sin_cos(reading.heading_rad(from) + 0.5 * turn_rad);
@@ -130,7 +130,7 @@ fn of_displacements(number: usize, run: &RunLog, reading: Reading, windows: &mut
     for displacement in &run.displacements {
         let turn_rad = reading.turn_rad(displacement.dtheta_rad);
         let length_s = displacement.t1_s - displacement.t0_s;
-        if turn_rad.abs() > MAX_WINDOW_TURN_RAD || length_s <= 0.0 {
+        if turn_rad.abs() > CHECKS.max_window_turn_rad || length_s <= 0.0 {
             continue;
         }
         let (sin, cos) = sin_cos(0.5 * turn_rad);
@@ -156,7 +156,7 @@ fn of_positions(number: usize, run: &RunLog, windows: &mut Vec<Window>) {
             let turn_rad = wrap_to_pi(course_rad - before_rad);
             // A robot that stands has no course, and one that turns back reverses it.
             let moves = distance_m > 0.5 * before_m && before_m > 0.5 * distance_m;
-            (moves && turn_rad.abs() < MAX_WINDOW_TURN_RAD && middle_s - before_s <= MAX_WINDOW_S)
+            (moves && turn_rad.abs() < CHECKS.max_window_turn_rad && middle_s - before_s <= CHECKS.max_window_s)
                 .then_some((before_s, middle_s, turn_rad))
         });
         before = Some((middle_s, course_rad, distance_m));

@@ -4,14 +4,14 @@
 //! *Budgeted* of an error budget, *Tuned* on something, or a *Convention*. docs/settings.md is made of
 //! these files.
 
-pub(crate) mod carry_over;
-pub(crate) mod findings;
-pub(crate) mod large_log;
-pub(crate) mod levels;
-pub(crate) mod plan;
-pub(crate) mod records;
-pub(crate) mod residuals;
-pub(crate) mod search;
+pub mod carry_over;
+pub mod findings;
+pub mod large_log;
+pub mod levels;
+pub mod plan;
+pub mod records;
+pub mod residuals;
+pub mod search;
 
 rules::rooms! {
     carry_over: carry_over::CarryOver as CARRY_OVER,

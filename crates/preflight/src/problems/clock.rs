@@ -6,10 +6,7 @@ use crate::alignment::{BestClock, Clock, Comparison, Explained};
 use crate::kind::{Kind, MirroredAxis};
 use crate::problem::{Problem, Severity, probability};
 use crate::session_check::{Matched, SessionCheck};
-use crate::settings::{
-    DECISIVE_RATIO, MAX_CLOCK_RATE, MAX_FITTED_OFFSET_S, MAX_LEFT_BY_FIX, MAX_NEAR_OFFSET_S, MAX_UNEXPLAINED,
-    MAX_WINDOWS, MIN_CLOCK_OFFSET_S, MIN_CLOCK_RATE, MIN_GAIN, MIN_WARNED_OFFSET_S, MIN_WINDOWS, UNRELATED,
-};
+use crate::settings::CHECKS;
 use crate::windows::{Measured, Reading, windows};
 
 /// Readings that are tried, the sound one first.
@@ -27,7 +24,9 @@ pub(crate) fn matched(check: &mut SessionCheck) -> Option<Matched> {
     let best = best_clock(check, reading, explained);
     let (reading, best) = match best {
         // Both may be wrong at once.
-        Some(best) if best.explained.unexplained.iter().any(|share| *share < MAX_UNEXPLAINED) => (reading, Some(best)),
+        Some(best) if best.explained.unexplained.iter().any(|share| *share < CHECKS.max_unexplained) => {
+            (reading, Some(best))
+        }
         _ => READINGS
             .iter()
             .filter_map(|reading| Some((*reading, best_clock(check, *reading, None)?)))
@@ -37,8 +36,8 @@ pub(crate) fn matched(check: &mut SessionCheck) -> Option<Matched> {
     let best = best?;
     let found = best.explained;
     let positions = check.measures_positions();
-    if !positions && found.unexplained.iter().all(|share| *share > UNRELATED) {
-        if found.windows > 4.0 * MIN_WINDOWS as f64 {
+    if !positions && found.unexplained.iter().all(|share| *share > CHECKS.unrelated) {
+        if found.windows > 4.0 * CHECKS.min_windows as f64 {
             let unexplained = found.unexplained[1].min(1.0);
             check.problems.push(Problem::new(&Kind::TruthUnrelated { unexplained }, Severity::Error, None, 0.9));
         }
@@ -54,10 +53,10 @@ pub(crate) fn matched(check: &mut SessionCheck) -> Option<Matched> {
 fn said_clock(check: &mut SessionCheck, reading: Reading, as_is: Option<Explained>, best: BestClock) -> Clock {
     let rated = rate(check, reading, best.clock);
     if let Some((clock, gain)) = rated {
-        let severity = if clock.rate.abs() > MAX_CLOCK_RATE { Severity::Error } else { Severity::Warning };
+        let severity = if clock.rate.abs() > CHECKS.max_clock_rate { Severity::Error } else { Severity::Warning };
         check.problems.push(Problem::new(&Kind::ClockRate { rate: clock.rate }, severity, None, probability(gain)));
         // What is left at the start of the records.
-        if clock.offset_s.abs() < 2.0 * MIN_WARNED_OFFSET_S {
+        if clock.offset_s.abs() < 2.0 * CHECKS.min_warned_offset_s {
             return clock;
         }
     }
@@ -66,8 +65,8 @@ fn said_clock(check: &mut SessionCheck, reading: Reading, as_is: Option<Explaine
         Some(gain) => {
             let offset_s = clock.offset_s / (1.0 + clock.rate);
             let severity = match offset_s.abs() {
-                large if large > MAX_FITTED_OFFSET_S => Severity::Error,
-                some if some > MIN_WARNED_OFFSET_S => Severity::Warning,
+                large if large > CHECKS.max_fitted_offset_s => Severity::Error,
+                some if some > CHECKS.min_warned_offset_s => Severity::Warning,
                 _ => Severity::Hint,
             };
             let kind = Kind::ClockOffset { offset_s, sigma_s: best.sigma_s };
@@ -91,25 +90,25 @@ fn best_reading(check: &SessionCheck, as_is: Option<Explained>) -> (Reading, Opt
 }
 
 fn is_decisive(found: &Explained, sound: &Explained) -> bool {
-    found.gain_over(sound) > MIN_GAIN
-        && found.ratio_to(sound) < DECISIVE_RATIO
-        && found.unexplained.iter().any(|share| *share < MAX_UNEXPLAINED)
+    found.gain_over(sound) > CHECKS.min_gain
+        && found.ratio_to(sound) < CHECKS.decisive_ratio
+        && found.unexplained.iter().any(|share| *share < CHECKS.max_unexplained)
 }
 
 /// The best clock near the stated one, or anywhere if none is good there.
 pub(crate) fn best_clock(check: &SessionCheck, reading: Reading, now: Option<Explained>) -> Option<BestClock> {
-    let (windows, measured) = windows(&check.runs, reading, MAX_WINDOWS / 4);
-    if windows.len() < MIN_WINDOWS {
+    let (windows, measured) = windows(&check.runs, reading, CHECKS.max_windows / 4);
+    if windows.len() < CHECKS.min_windows {
         return None;
     }
     let comparison = Comparison { windows: &windows, measured, runs: &check.runs, m_per_rad: check.m_per_rad() };
-    let is_good = |best: &BestClock| best.explained.unexplained.iter().any(|share| *share < MAX_UNEXPLAINED);
+    let is_good = |best: &BestClock| best.explained.unexplained.iter().any(|share| *share < CHECKS.max_unexplained);
     if now.is_some() {
         // A path that repeats itself fits again a lap later: the clock is far off where that is decisive.
-        let close = comparison.best_offset(Some(MAX_FITTED_OFFSET_S)).filter(is_good);
-        let near = comparison.best_offset(Some(MAX_NEAR_OFFSET_S)).filter(is_good);
+        let close = comparison.best_offset(Some(CHECKS.max_fitted_offset_s)).filter(is_good);
+        let near = comparison.best_offset(Some(CHECKS.max_near_offset_s)).filter(is_good);
         let is_farther =
-            |near: &BestClock| close.is_none_or(|close| near.explained.gain_over(&close.explained) > MIN_GAIN);
+            |near: &BestClock| close.is_none_or(|close| near.explained.gain_over(&close.explained) > CHECKS.min_gain);
         if let Some(found) = near.filter(is_farther).or(close) {
             return Some(found);
         }
@@ -125,33 +124,33 @@ pub(crate) fn offset_gain(
     clock: Clock,
     sigma_s: f64,
 ) -> Option<f64> {
-    if clock.offset_s.abs() < MIN_CLOCK_OFFSET_S.max(4.0 * sigma_s) {
+    if clock.offset_s.abs() < CHECKS.min_clock_offset_s.max(4.0 * sigma_s) {
         return None;
     }
     let now = if reading == Reading::AS_IS { as_is } else { check.explained(reading, Clock::default()) };
     let with = check.explained(reading, clock)?;
     let Some(now) = now else { return Some(f64::INFINITY) };
     let gain = with.gain_over(&now);
-    (gain > MIN_GAIN && with.ratio_to(&now) < 0.5 * (1.0 + DECISIVE_RATIO)).then_some(gain)
+    (gain > CHECKS.min_gain && with.ratio_to(&now) < 0.5 * (1.0 + CHECKS.decisive_ratio)).then_some(gain)
 }
 
 /// A rate that matters, with what it gains.
 fn rate(check: &SessionCheck, reading: Reading, near: Clock) -> Option<(Clock, f64)> {
-    let (windows, measured) = windows(&check.runs, reading, MAX_WINDOWS / 2);
+    let (windows, measured) = windows(&check.runs, reading, CHECKS.max_windows / 2);
     let comparison = Comparison { windows: &windows, measured, runs: &check.runs, m_per_rad: check.m_per_rad() };
     let still = comparison.at(near)?;
     let (rated, found) = comparison.best_rate(near)?;
     let gain = found.gain_over(&still);
-    let is_explained = found.unexplained.iter().all(|share| *share < MAX_LEFT_BY_FIX);
-    let matters = rated.rate.abs() > MIN_CLOCK_RATE && gain > MIN_GAIN && is_explained;
-    (matters && found.ratio_to(&still) < 0.5 * (1.0 + DECISIVE_RATIO)).then_some((rated, gain))
+    let is_explained = found.unexplained.iter().all(|share| *share < CHECKS.max_left_by_fix);
+    let matters = rated.rate.abs() > CHECKS.min_clock_rate && gain > CHECKS.min_gain && is_explained;
+    (matters && found.ratio_to(&still) < 0.5 * (1.0 + CHECKS.decisive_ratio)).then_some((rated, gain))
 }
 
 /// Says how the instrument's records are to be read.
 fn say_reading(check: &mut SessionCheck, matched: &Matched, as_is: Option<Explained>) {
-    let gain = as_is.map_or(MIN_GAIN, |sound| matched.explained.gain_over(&sound));
+    let gain = as_is.map_or(CHECKS.min_gain, |sound| matched.explained.gain_over(&sound));
     // What is named explains the log.
-    let is_explained = matched.explained.unexplained.iter().all(|share| *share < MAX_LEFT_BY_FIX);
+    let is_explained = matched.explained.unexplained.iter().all(|share| *share < CHECKS.max_left_by_fix);
     if matched.measured == Measured::Positions || matched.reading == Reading::AS_IS || !is_explained {
         return;
     }

@@ -8,9 +8,7 @@ use crate::kind::Kind;
 use crate::problem::{Problem, Severity};
 use crate::run_log::RunLog;
 use crate::session_check::SessionCheck;
-use crate::settings::{
-    COUNTER_BITS, IMPOSSIBLE_STEP_RATIO, MIN_ROWS, MIN_USUAL_COUNTS, MIN_WHEEL_TURN_RAD, USUAL_STEP_QUANTILE,
-};
+use crate::settings::CHECKS;
 
 /// What a run's counter does.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,7 +52,7 @@ pub(crate) fn found(check: &mut SessionCheck) {
 /// Steps over what is usual, a second.
 fn faults(run: &RunLog, side: Side) -> Vec<Fault> {
     let angles = &run.wheels[side];
-    if angles.len() < MIN_ROWS {
+    if angles.len() < CHECKS.min_rows {
         return Vec::new();
     }
     let length_s = |row: usize| run.t_s[row + 1] - run.t_s[row];
@@ -62,9 +60,9 @@ fn faults(run: &RunLog, side: Side) -> Vec<Fault> {
     // In a gap, wheels go on turning.
     let step = |row: usize| (angles[row + 1] - angles[row]) * (median_s / length_s(row)).min(1.0);
     let sizes = (0..angles.len() - 1).map(|row| step(row).abs()).filter(|size| *size > 0.0);
-    let Some(usual) = quantile(sizes, USUAL_STEP_QUANTILE) else { return Vec::new() };
-    let usual = usual.max(MIN_USUAL_COUNTS * run.count_rad).max(MIN_WHEEL_TURN_RAD * 1e-2);
-    let impossible = |row: usize| step(row).abs() > IMPOSSIBLE_STEP_RATIO * usual;
+    let Some(usual) = quantile(sizes, CHECKS.usual_step_quantile) else { return Vec::new() };
+    let usual = usual.max(CHECKS.min_usual_counts * run.count_rad).max(CHECKS.min_wheel_turn_rad * 1e-2);
+    let impossible = |row: usize| step(row).abs() > CHECKS.impossible_step_ratio * usual;
     let mut found = Vec::new();
     let mut row = 0;
     while row + 1 < angles.len() {
@@ -77,8 +75,9 @@ fn faults(run: &RunLog, side: Side) -> Vec<Fault> {
             }
             let jump = (angles[row + 1] - angles[row]).abs() / if run.count_rad > 0.0 { run.count_rad } else { 1.0 };
             let wraps =
-                COUNTER_BITS.iter().any(|bits| (jump - 2.0_f64.powi(*bits)).abs() * run.count_rad < 4.0 * usual);
-            if !wraps && angles[row + 1].abs() < 4.0 * usual && angles[row].abs() > IMPOSSIBLE_STEP_RATIO * usual {
+                CHECKS.counter_bits.iter().any(|bits| (jump - 2.0_f64.powi(*bits)).abs() * run.count_rad < 4.0 * usual);
+            if !wraps && angles[row + 1].abs() < 4.0 * usual && angles[row].abs() > CHECKS.impossible_step_ratio * usual
+            {
                 found.push(Fault::Restart { row: row + 1 });
             }
         }

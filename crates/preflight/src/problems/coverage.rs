@@ -14,7 +14,7 @@ use crate::kind::Kind;
 use crate::problem::{Problem, Severity};
 use crate::run_log::{Part, RunLog};
 use crate::session_check::SessionCheck;
-use crate::settings::{DETERMINED_SIGMA, INSTANTS, MAX_STRAIGHT_TURN_RAD, MIN_DISTANCE_M, MIN_TURNING_RAD, ONE_WAY};
+use crate::settings::CHECKS;
 use crate::windows::Measured;
 
 pub(crate) const PARAMETERS: [&str; 3] = ["left_wheel_diameter_m", "right_wheel_diameter_m", "wheel_separation_m"];
@@ -27,14 +27,14 @@ pub(crate) fn found(check: &mut SessionCheck) {
     let m_per_rad = check.m_per_rad();
     let distance_m = 0.5 * (turning.left * m_per_rad.left + turning.right * m_per_rad.right);
     let off = check.problems.iter().any(|problem| problem.severity == Severity::Error);
-    if !off && distance_m < MIN_DISTANCE_M * check.robot.left_wheel_diameter_m.min(0.15) / 0.15 {
+    if !off && distance_m < CHECKS.min_distance_m * check.robot.left_wheel_diameter_m.min(0.15) / 0.15 {
         check.problems.push(Problem::new(&Kind::TooShort { distance_m }, Severity::Warning, None, 0.9));
     }
     let mut driven = Driven::default();
     check.runs.iter().for_each(|run| driven.add(run, check.robot.wheel_separation_m, m_per_rad));
     let Driven { left_rad, right_rad, .. } = driven;
     let all_rad = left_rad + right_rad;
-    if !off && all_rad > MIN_TURNING_RAD && left_rad.max(right_rad) > ONE_WAY * all_rad {
+    if !off && all_rad > CHECKS.min_turning_rad && left_rad.max(right_rad) > CHECKS.one_way * all_rad {
         let kind = Kind::OneWayTurns { left: left_rad > right_rad };
         check.problems.push(Problem::new(&kind, Severity::Hint, None, 0.9));
     }
@@ -79,11 +79,11 @@ impl Coverage {
 /// Which parameters an information determines.
 pub(crate) fn are_determined(information: &Information, partial: bool) -> [bool; 3] {
     let mut sigma = sigmas(information);
-    if partial && sigma[..2].iter().any(|sigma| *sigma >= DETERMINED_SIGMA) {
+    if partial && sigma[..2].iter().any(|sigma| *sigma >= CHECKS.determined_sigma) {
         // The wheels then stay as they are stated, and the separation is the one that goes with them.
         sigma[2] = (1.0 + information[2][2]).sqrt().recip();
     }
-    sigma.map(|sigma| sigma < DETERMINED_SIGMA)
+    sigma.map(|sigma| sigma < CHECKS.determined_sigma)
 }
 
 /// Which parameters the sessions determine together; what they do not is a problem.
@@ -210,7 +210,7 @@ fn add_partial(run: &RunLog, session: &SessionCheck, row: &mut impl FnMut([f64; 
             (Part::WallLength, _) => {}
             (Part::Turn, _) => row(by_turn, of.sigma),
             (Part::GyroTurn, Some(scale)) => row(by_turn, of.sigma.hypot(scale * turn_rad)),
-            (Part::GyroTurn, None) if turn_rad.abs() < MAX_STRAIGHT_TURN_RAD => row(by_turn, of.sigma),
+            (Part::GyroTurn, None) if turn_rad.abs() < CHECKS.max_straight_turn_rad => row(by_turn, of.sigma),
             (Part::GyroTurn, None) => {}
         }
     }
@@ -235,7 +235,7 @@ fn add_ends(run: &RunLog, geometry: &DriveGeometry, row: &mut impl FnMut([f64; 3
     if !(last.t_s > first.t_s && run.truth.iter().all(is_number)) {
         return;
     }
-    let count = INSTANTS.min(run.truth.len() - 1);
+    let count = CHECKS.instants.min(run.truth.len() - 1);
     let instants_s: Vec<f64> =
         (1..=count).map(|k| first.t_s + (last.t_s - first.t_s) * k as f64 / count as f64).collect();
     let path = |factors: [f64; 3]| {

@@ -7,7 +7,7 @@ use crate::kind::Kind;
 use crate::problem::{Problem, Severity, probability};
 use crate::run_log::RunLog;
 use crate::session_check::SessionCheck;
-use crate::settings::{LENGTH_UNITS, MAX_UNEXPLAINED, TICK_FACTORS};
+use crate::settings::CHECKS;
 
 /// What the wheels may be.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,9 +28,9 @@ fn hypotheses() -> Vec<Hypothesis> {
     for (left, right) in [(-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)] {
         all.push(Hypothesis { signs: Wheels { left, right }, ..SOUND });
     }
-    let unit = LENGTH_UNITS[0];
+    let unit = CHECKS.length_units[0];
     all.extend([unit, unit.recip()].map(|unit| Hypothesis { unit, ..SOUND }));
-    all.extend(TICK_FACTORS.map(|wheels| Hypothesis { wheels, ..SOUND }));
+    all.extend(CHECKS.tick_factors.map(|wheels| Hypothesis { wheels, ..SOUND }));
     all
 }
 
@@ -131,7 +131,7 @@ fn decided(check: &SessionCheck, costs: Vec<(Hypothesis, f64)>, count: usize) ->
     let Some((_, sound)) = costs.first().copied() else { return Vec::new() };
     let Some((best, cost)) = costs.into_iter().min_by(|a, b| a.1.total_cmp(&b.1)) else { return Vec::new() };
     // A quarter of the motion is what a robot of other sizes misses by.
-    let is_decisive = best != SOUND && cost < 0.5 * MAX_UNEXPLAINED && cost < 0.4 * sound;
+    let is_decisive = best != SOUND && cost < 0.5 * CHECKS.max_unexplained && cost < 0.4 * sound;
     if !is_decisive || count < 4 {
         return Vec::new();
     }

@@ -6,7 +6,7 @@ use crate::kind::Kind;
 use crate::problem::{Problem, Severity};
 use crate::problems::time_unit::median_row_s;
 use crate::session_check::SessionCheck;
-use crate::settings::{GAP_RATIO, LOST_ROWS, MIN_GAP_S, MIN_WHEEL_TURN_RAD};
+use crate::settings::CHECKS;
 
 pub(crate) fn found(check: &mut SessionCheck) {
     let mut problems = Vec::new();
@@ -18,9 +18,9 @@ pub(crate) fn found(check: &mut SessionCheck) {
         let lengths = || run.t_s.windows(2).map(|pair| pair[1] - pair[0]).enumerate();
         let moved = |row: usize| {
             let step = |angles: &Vec<f64>| (angles[row + 1] - angles[row]).abs();
-            step(&run.wheels.left) + step(&run.wheels.right) > MIN_WHEEL_TURN_RAD
+            step(&run.wheels.left) + step(&run.wheels.right) > CHECKS.min_wheel_turn_rad
         };
-        let is_gap = |length_s: f64| length_s > (GAP_RATIO * median_s).max(MIN_GAP_S);
+        let is_gap = |length_s: f64| length_s > (CHECKS.gap_ratio * median_s).max(CHECKS.min_gap_s);
         let longest =
             lengths().filter(|(row, length_s)| is_gap(*length_s) && moved(*row)).max_by(|a, b| a.1.total_cmp(&b.1));
         if let Some((row, length_s)) = longest.filter(|_| run.continuous) {
@@ -39,7 +39,7 @@ pub(crate) fn found(check: &mut SessionCheck) {
             .filter(|rows| *rows > 0.0)
             .sum();
         let share = missing / (missing + run.t_s.len() as f64);
-        if share > LOST_ROWS {
+        if share > CHECKS.lost_rows {
             losing.push(run.id.clone());
             most = most.max(share);
         }

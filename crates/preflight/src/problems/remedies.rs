@@ -8,10 +8,7 @@ use serde::Serialize;
 
 use crate::problems::coverage::{Coverage, Information, PARAMETERS, add_row, are_determined, gradients, travel};
 use crate::session_check::SessionCheck;
-use crate::settings::{
-    GYRO_TURN_SIGMA_RAD, MARK_SIGMA_RAD, MAX_STRAIGHT_TURN_RAD, MIN_TAPED_M, POSE_SIGMA_M, POSE_SIGMA_RAD,
-    TAPE_SIGMA_M, WALL_SIGMA_M, WALL_SIGMA_RAD,
-};
+use crate::settings::CHECKS;
 
 /// An instrument that most people have or can make.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -53,24 +50,24 @@ impl Remedy {
             let Some(last) = run.wheels.left.len().checked_sub(1) else { continue };
             let (travel_m, turn_rad) = travel(run, (0, last), m_per_rad, separation_m);
             let [by_length, by_turn] = gradients(travel_m, turn_rad, separation_m);
-            let is_straight = turn_rad.abs() < MAX_STRAIGHT_TURN_RAD;
-            let is_far = 0.5 * (travel_m.left + travel_m.right).abs() > MIN_TAPED_M;
+            let is_straight = turn_rad.abs() < CHECKS.max_straight_turn_rad;
+            let is_far = 0.5 * (travel_m.left + travel_m.right).abs() > CHECKS.min_taped_m;
             let mut length = |sigma_m: f64| {
                 if is_straight && is_far {
                     add_row(information, by_length, sigma_m);
                 }
             };
             match self {
-                Self::Tape => length(TAPE_SIGMA_M),
-                Self::Wall if !session.has_lidar => length(WALL_SIGMA_M),
-                Self::Poses => length(POSE_SIGMA_M),
+                Self::Tape => length(CHECKS.tape_sigma_m),
+                Self::Wall if !session.has_lidar => length(CHECKS.wall_sigma_m),
+                Self::Poses => length(CHECKS.pose_sigma_m),
                 Self::Revisit | Self::Gyro | Self::Wall => {}
             }
             let sigma_rad = match self {
-                Self::Revisit if turn_rad.abs() >= std::f64::consts::PI => Some(MARK_SIGMA_RAD),
-                Self::Gyro if is_straight => Some(GYRO_TURN_SIGMA_RAD),
-                Self::Wall => Some(WALL_SIGMA_RAD),
-                Self::Poses => Some(POSE_SIGMA_RAD),
+                Self::Revisit if turn_rad.abs() >= std::f64::consts::PI => Some(CHECKS.mark_sigma_rad),
+                Self::Gyro if is_straight => Some(CHECKS.gyro_turn_sigma_rad),
+                Self::Wall => Some(CHECKS.wall_sigma_rad),
+                Self::Poses => Some(CHECKS.pose_sigma_rad),
                 Self::Tape | Self::Revisit | Self::Gyro => None,
             };
             if let Some(sigma_rad) = sigma_rad {

@@ -5,7 +5,7 @@ use dataset::{Dataset, NominalRobot, Run, WheelLog};
 use crate::kind::Kind;
 use crate::problem::{Problem, Severity};
 use crate::session_check::SessionCheck;
-use crate::settings::{MAX_ROUNDED_SHARE, MIN_ROUNDED_SHARE};
+use crate::settings::CHECKS;
 
 pub(crate) fn found(check: &mut SessionCheck, dataset: &Dataset) {
     let rounded = dataset.runs.iter().filter_map(|run| Some((run, run.odometry.wheels.recorded_step()?)));
@@ -16,8 +16,8 @@ pub(crate) fn found(check: &mut SessionCheck, dataset: &Dataset) {
         (off_m + own_off_m, driven_m + own_m)
     });
     let share = off_m / driven_m;
-    if share > MIN_ROUNDED_SHARE {
-        let severity = if share > MAX_ROUNDED_SHARE { Severity::Warning } else { Severity::Hint };
+    if share > CHECKS.min_rounded_share {
+        let severity = if share > CHECKS.max_rounded_share { Severity::Warning } else { Severity::Hint };
         let runs = rounded.into_iter().map(|(run, _)| run.info.id.clone()).collect();
         let kind = Kind::RoundedRates { step, share };
         check.problems.push(Problem::new(&kind, severity, Some(runs), 0.95));

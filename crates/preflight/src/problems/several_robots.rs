@@ -4,13 +4,7 @@ use crate::kind::Kind;
 use crate::problem::{Problem, Severity};
 use crate::problems::wheels::certain;
 use crate::session_check::SessionCheck;
-use crate::settings::{CERTAIN_SIGMAS, SAME_SEPARATION, SAME_WHEEL};
-
-const PARAMETERS: [(&str, f64); 3] = [
-    ("left_wheel_diameter_m", SAME_WHEEL),
-    ("right_wheel_diameter_m", SAME_WHEEL),
-    ("wheel_separation_m", SAME_SEPARATION),
-];
+use crate::settings::CHECKS;
 
 /// The two sessions that differ most, over what one robot's do.
 pub(crate) fn found(sessions: &[SessionCheck]) -> Option<Problem> {
@@ -28,14 +22,22 @@ pub(crate) fn found(sessions: &[SessionCheck]) -> Option<Problem> {
             sound.then_some((geometry_m, geometry.sigma, session.name.as_str()))
         })
         .collect();
+    let parameters = [
+        ("left_wheel_diameter_m", CHECKS.same_wheel),
+        ("right_wheel_diameter_m", CHECKS.same_wheel),
+        ("wheel_separation_m", CHECKS.same_separation),
+    ];
     let mut worst: Option<(f64, f64, Kind)> = None;
     for (first, a) in estimates.iter().enumerate() {
         for b in &estimates[first + 1..] {
-            for (at, (parameter, same)) in PARAMETERS.iter().enumerate() {
+            for (at, (parameter, same)) in parameters.into_iter().enumerate() {
                 let log_ratio = (a.0[at] / b.0[at]).ln().abs();
                 let sigmas = (log_ratio - same) / a.1[at].hypot(b.1[at]).max(1e-9);
                 let ratio = log_ratio / same;
-                if log_ratio > *same && sigmas > CERTAIN_SIGMAS && worst.as_ref().is_none_or(|worst| ratio > worst.0) {
+                if log_ratio > same
+                    && sigmas > CHECKS.certain_sigmas
+                    && worst.as_ref().is_none_or(|worst| ratio > worst.0)
+                {
                     let kind = Kind::SeveralRobots {
                         parameter,
                         sessions: [a.2.to_owned(), b.2.to_owned()],

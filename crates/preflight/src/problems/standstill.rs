@@ -3,7 +3,7 @@
 use crate::kind::Kind;
 use crate::problem::{Problem, Severity};
 use crate::session_check::SessionCheck;
-use crate::settings::{MIN_WHEEL_TURN_RAD, STANDING_M};
+use crate::settings::CHECKS;
 
 /// Whether nothing moves, so that nothing else can be checked.
 pub(crate) fn found(check: &mut SessionCheck) -> bool {
@@ -15,7 +15,7 @@ pub(crate) fn found(check: &mut SessionCheck) -> bool {
                 angles.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), a| (l.min(*a), h.max(*a)));
             high - low
         };
-        spread(&run.wheels.left).max(spread(&run.wheels.right)) > MIN_WHEEL_TURN_RAD
+        spread(&run.wheels.left).max(spread(&run.wheels.right)) > CHECKS.min_wheel_turn_rad
     });
     if !net {
         let kind = Kind::NothingMoves { wheels_turn_rad, truth_extent_m: None };
@@ -36,10 +36,10 @@ pub(crate) fn found(check: &mut SessionCheck) -> bool {
         extent_m = extent_m.max(of(|sample| sample.x_m)).max(of(|sample| sample.y_m));
         let headings: Vec<f64> = run.truth.iter().filter_map(dataset::TruthSample::theta_rad).collect();
         // Positions alone do not show a robot that spins on the spot.
-        turns |= headings.is_empty() || extent(&headings) > 5.0 * MIN_WHEEL_TURN_RAD;
+        turns |= headings.is_empty() || extent(&headings) > 5.0 * CHECKS.min_wheel_turn_rad;
     }
     let sees = check.runs.iter().all(|run| run.truth.len() > 2);
-    if sees && !turns && extent_m < STANDING_M && driven_m > 50.0 * STANDING_M {
+    if sees && !turns && extent_m < CHECKS.standing_m && driven_m > 50.0 * CHECKS.standing_m {
         let kind = Kind::NothingMoves { wheels_turn_rad, truth_extent_m: Some(extent_m) };
         check.problems.push(Problem::new(&kind, Severity::Error, None, 0.99));
         return true;

@@ -7,9 +7,7 @@ use crate::kind::Kind;
 use crate::problem::{Problem, Severity};
 use crate::run_log::RunLog;
 use crate::session_check::SessionCheck;
-use crate::settings::{
-    MIN_OWN_STEP_M, MIN_OWN_STEP_RAD, MIN_OWN_TURN_RAD, MIN_WINDOWS, OWN_DISTANCE, OWN_HEADING_RAD, OWN_STEP_RAD,
-};
+use crate::settings::CHECKS;
 use kinematics::{Wheels, wrap_to_pi};
 
 pub(crate) fn found(check: &mut SessionCheck) {
@@ -28,11 +26,14 @@ pub(crate) fn found(check: &mut SessionCheck) {
         steps_off_rad.extend(found.steps_off_rad);
     }
     let ratio_off = if driven_m > 0.0 { (went_m / driven_m - 1.0).abs() } else { 0.0 };
-    if samples >= MIN_WINDOWS && turning_rad > MIN_OWN_TURN_RAD && off_rad < OWN_HEADING_RAD && ratio_off < OWN_DISTANCE
+    if samples >= CHECKS.min_windows
+        && turning_rad > CHECKS.min_own_turn_rad
+        && off_rad < CHECKS.own_heading_rad
+        && ratio_off < CHECKS.own_distance
     {
         check.problems.push(Problem::new(&Kind::TruthIsOdometry, Severity::Warning, None, 0.99));
-    } else if steps_off_rad.len() >= MIN_WINDOWS && turning_rad > MIN_OWN_TURN_RAD {
-        let own = steps_off_rad.iter().filter(|off_rad| **off_rad < OWN_STEP_RAD).count();
+    } else if steps_off_rad.len() >= CHECKS.min_windows && turning_rad > CHECKS.min_own_turn_rad {
+        let own = steps_off_rad.iter().filter(|off_rad| **off_rad < CHECKS.own_step_rad).count();
         if 2 * own > steps_off_rad.len() {
             let kind = Kind::TruthFollowsOdometry { share: own as f64 / steps_off_rad.len() as f64 };
             check.problems.push(Problem::new(&kind, Severity::Warning, None, 0.99));
@@ -67,11 +68,11 @@ fn compared(run: &RunLog, m_per_rad: Wheels<f64>, separation_m: f64) -> Option<C
         let distance_m = 0.5 * (travel_m.left + travel_m.right);
         if let Some((x_m, y_m, seen_rad, before_rad, before_m)) = before {
             found.turning_rad += (turn_rad - before_rad).abs();
-            if (turn_rad - before_rad).abs() > MIN_OWN_STEP_RAD {
+            if (turn_rad - before_rad).abs() > CHECKS.min_own_step_rad {
                 found.steps_off_rad.push(wrap_to_pi(heading_rad - seen_rad - (turn_rad - before_rad)).abs());
             }
             let step_m = (distance_m - before_m).abs() * kinematics::sinc(0.5 * (turn_rad - before_rad));
-            if step_m > MIN_OWN_STEP_M {
+            if step_m > CHECKS.min_own_step_m {
                 found.went_m += (sample.x_m - x_m).hypot(sample.y_m - y_m);
                 found.driven_m += step_m;
             }

@@ -5,23 +5,23 @@ use dataset::quantile;
 use crate::kind::Kind;
 use crate::problem::{Problem, Severity};
 use crate::session_check::SessionCheck;
-use crate::settings::{IMPOSSIBLE_STEP_RATIO, MAX_POSITION_M, MIN_OUTLIER_M, MIN_ROWS, USUAL_STEP_QUANTILE};
+use crate::settings::CHECKS;
 
 pub(crate) fn found(check: &mut SessionCheck) {
     let mut problems = Vec::new();
     for run in &mut check.runs {
         let truth = &run.truth;
         let step = |a: usize, b: usize| (truth[b].x_m - truth[a].x_m).hypot(truth[b].y_m - truth[a].y_m);
-        let is_far = |row: usize| truth[row].x_m.abs().max(truth[row].y_m.abs()) > MAX_POSITION_M;
+        let is_far = |row: usize| truth[row].x_m.abs().max(truth[row].y_m.abs()) > CHECKS.max_position_m;
         let mut far: Vec<usize> = (0..truth.len()).filter(|row| is_far(*row)).collect();
         let all_are_far = far.len() * 2 > truth.len();
         if all_are_far {
             far.clear();
         }
-        if truth.len() >= MIN_ROWS {
+        if truth.len() >= CHECKS.min_rows {
             let steps = (1..truth.len()).map(|row| step(row - 1, row)).filter(|step| *step > 0.0);
-            let usual = quantile(steps, USUAL_STEP_QUANTILE).unwrap_or(0.0);
-            let most = (IMPOSSIBLE_STEP_RATIO * usual).max(MIN_OUTLIER_M);
+            let usual = quantile(steps, CHECKS.usual_step_quantile).unwrap_or(0.0);
+            let most = (CHECKS.impossible_step_ratio * usual).max(CHECKS.min_outlier_m);
             let jumps = |row: &usize| {
                 let (before, after) = (step(row - 1, *row), step(*row, row + 1));
                 before > most && after > most && step(row - 1, row + 1) < 0.2 * before.min(after)

@@ -8,12 +8,9 @@ use crate::problem::{Problem, Severity, probability};
 use crate::problems::ends;
 use crate::run_log::RunLog;
 use crate::session_check::SessionCheck;
-use crate::settings::{
-    CERTAIN_SIGMAS, FACTOR_TOLERANCE, LENGTH_UNITS, MAX_SEPARATION_RATIO, MAX_WHEEL_RATIO, MIN_TURNING_RAD,
-    TICK_FACTORS, UNIT_TOLERANCE,
-};
+use crate::settings::CHECKS;
 
-/// Names of the units of [`LENGTH_UNITS`].
+/// Names of the units of `length_units`.
 const UNIT_NAMES: [&str; 4] = ["millimetres", "centimetres", "inches", "feet"];
 
 pub(crate) fn found(check: &mut SessionCheck) {
@@ -75,7 +72,7 @@ pub(crate) fn found(check: &mut SessionCheck) {
             let ratio = one.distance_m_per_rad / distance_m.abs();
             kinds.extend(scale(check, Wheels::both(ratio), None, [one.distance_sigma; 3]));
         } else if one.turn_per_rad * turn_rad < 0.0
-            && one.turn_per_rad.abs() > CERTAIN_SIGMAS * one.turn_sigma
+            && one.turn_per_rad.abs() > CHECKS.certain_sigmas * one.turn_sigma
             && !mirrored
         {
             kinds.push(Kind::WheelsExchanged { label: truth_follows_labels(&check.runs) });
@@ -95,13 +92,13 @@ pub(crate) fn found(check: &mut SessionCheck) {
 /// What ratios to the stated values say, if they are certain.
 fn scale(check: &SessionCheck, wheels: Wheels<f64>, separation: Option<f64>, sigma: [f64; 3]) -> Option<Kind> {
     let is_off = |ratio: f64, most: f64, sigma: f64| {
-        ratio.ln().abs() > most.ln() && ratio.ln().abs() - most.ln() > CERTAIN_SIGMAS * sigma.min(0.05)
+        ratio.ln().abs() > most.ln() && ratio.ln().abs() - most.ln() > CHECKS.certain_sigmas * sigma.min(0.05)
     };
     let off = Wheels {
-        left: is_off(wheels.left, MAX_WHEEL_RATIO, sigma[0]),
-        right: is_off(wheels.right, MAX_WHEEL_RATIO, sigma[1]),
+        left: is_off(wheels.left, CHECKS.max_wheel_ratio, sigma[0]),
+        right: is_off(wheels.right, CHECKS.max_wheel_ratio, sigma[1]),
     };
-    let near = |a: f64, b: f64| (a / b).ln().abs() < FACTOR_TOLERANCE;
+    let near = |a: f64, b: f64| (a / b).ln().abs() < CHECKS.factor_tolerance;
     // The product of two that are large has no number.
     let mean = wheels.left.sqrt() * wheels.right.sqrt();
     if off.left && off.right && near(wheels.left, wheels.right) {
@@ -110,20 +107,26 @@ fn scale(check: &SessionCheck, wheels: Wheels<f64>, separation: Option<f64>, sig
         {
             // Near feet, the last, lie km/h and radii.
             let is_unit = |ratio: f64, number: usize| {
-                let off = ratio / LENGTH_UNITS[number];
-                if number + 1 == LENGTH_UNITS.len() { (off - 1.0).abs() < UNIT_TOLERANCE } else { near(off, 1.0) }
+                let off = ratio / CHECKS.length_units[number];
+                if number + 1 == CHECKS.length_units.len() {
+                    (off - 1.0).abs() < CHECKS.unit_tolerance
+                } else {
+                    near(off, 1.0)
+                }
             };
-            let units = 0..LENGTH_UNITS.len();
+            let units = 0..CHECKS.length_units.len();
             let unit = units.clone().find(|number| is_unit(mean, *number));
             let nominal_unit = units.clone().find(|number| is_unit(mean.recip(), *number));
             return Some(Kind::LengthUnit {
-                ratio: unit
-                    .map_or_else(|| nominal_unit.map_or(mean, |at| LENGTH_UNITS[at].recip()), |at| LENGTH_UNITS[at]),
+                ratio: unit.map_or_else(
+                    || nominal_unit.map_or(mean, |at| CHECKS.length_units[at].recip()),
+                    |at| CHECKS.length_units[at],
+                ),
                 unit: unit.or(nominal_unit).map(|at| UNIT_NAMES[at]),
                 of_truth: mean > 1.0,
             });
         }
-        let simple = TICK_FACTORS.iter().copied().find(|factor| near(mean, *factor));
+        let simple = CHECKS.tick_factors.iter().copied().find(|factor| near(mean, *factor));
         let ratio = simple.unwrap_or(mean);
         return Some(Kind::TicksPerTurn { ratio, stated: check.robot.ticks_per_rev, simple: simple.is_some() });
     }
@@ -133,7 +136,7 @@ fn scale(check: &SessionCheck, wheels: Wheels<f64>, separation: Option<f64>, sig
         (
             "wheel_separation_m",
             separation.unwrap_or(1.0),
-            separation.is_some_and(|ratio| is_off(ratio, MAX_SEPARATION_RATIO, sigma[2])),
+            separation.is_some_and(|ratio| is_off(ratio, CHECKS.max_separation_ratio, sigma[2])),
         ),
     ] {
         if off {
@@ -157,7 +160,7 @@ fn truth_follows_labels(runs: &[RunLog]) -> Option<bool> {
         let turned: f64 = headings.windows(2).map(|pair| kinematics::wrap_to_pi(pair[1] - pair[0])).sum();
         agreement += sense * turned;
     }
-    (agreement.abs() > MIN_TURNING_RAD).then_some(agreement > 0.0)
+    (agreement.abs() > CHECKS.min_turning_rad).then_some(agreement > 0.0)
 }
 
 /// The probability of what fits better by so many squared standard deviations.
