@@ -1,60 +1,23 @@
 //! The order of work.
 
-use calib::methods::joint::calibrated_drive;
-use calib::{CalibError, Calibration, CalibrationReport, MethodReport, Names};
 use dataset::Dataset;
 use effects::CATALOGUE;
-use estimation::{EstimationError, FitSettings, ModelFit};
-use rayon::prelude::*;
+use estimation::{EstimationError, ModelFit};
 use rules::Rule;
-use scenario::Scenario;
 
 use crate::candidates::candidate::{Candidate, mean_terms};
-use crate::carry_over::{CarryOver, carry_over};
-use crate::checks::check::TestResult;
-use crate::checks::residuals::{Residuals, residuals};
-use crate::document::{Document, Gain};
-use crate::findings::alternatives::{Alternative, alternatives};
-use crate::findings::detectability::detectability;
 use crate::findings::extrinsics;
-use crate::findings::finding::Finding;
-use crate::findings::stages::{StageResults, findings};
-use crate::fits::augmented_model::{AugmentedModel, refit};
-use crate::gain::{gain_by_level, held_out_drift};
-use crate::plan::{Limits, next_experiment};
-use crate::records::clock_drift::clock_drift;
-use crate::records::clock_offsets::clock_offsets;
-use crate::records::clock_profile::RunClock;
+use crate::options::Options;
 use crate::records::large_log::LargeLog;
-use crate::records::log_rows::{check_rows, check_spans};
-use crate::records::names::session_names;
-use crate::records::record_faults::{Fault, determines_wheels, fault, is_correlated, rejected_share, sessions};
-use crate::records::stamp_errors::{
-    stamp_error, stamp_error_by_counts, uncertain_tick_s, whole_stamp_error, with_rows_of,
-};
-use crate::records::unknown_motion::{AnomalyKind, unknown_motions};
-use crate::search::mean_structure::{THINNED, mean_structure};
+use crate::records::prepared::{BeforeFit, Prepared};
+use crate::records::record_faults::{determines_wheels, faults, is_correlated, rejected_share, sessions};
+use crate::records::stamp_errors::{StampError, stamp_error, whole_stamp_error, with_rows_of};
+use crate::records::unknown_motion::AnomalyKind;
+use crate::report::{AsStamped, Diagnosis, EVERY_MEASUREMENT, Explained, Log};
+use crate::search::mean_structure::{MeanStructure, THINNED, mean_structure};
 use crate::settings::RECORDS;
 use crate::settings::large_log::MAX_RUNS;
-use crate::stage::{OnStage, Step};
-use crate::text;
-
-/// What to leave out of the catalogue, and the limits of the next experiment.
-#[derive(Debug, Clone)]
-pub struct Options {
-    /// Effects that are not to be named, by id.
-    pub without: Vec<String>,
-    /// Floor, time and speed within which the next experiment is sought; `None`: none is sought.
-    pub limits: Option<Limits>,
-    /// What is told when a stage begins: a large log takes minutes.
-    pub on_stage: OnStage,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self { without: Vec::new(), limits: Some(Limits::default()), on_stage: OnStage::default() }
-    }
-}
+use crate::stage::Step;
 
 /// Why there is no diagnosis.
 #[derive(Debug, thiserror::Error)]
@@ -96,63 +59,12 @@ pub enum DiagnoseError {
     NoFit(#[from] EstimationError),
 }
 
-/// A diagnosis.
-#[derive(Debug, Clone)]
-pub struct Diagnosis {
-    /// What goes to scripts.
-    pub document: Document,
-    /// The simulated robot with what was found, where it can be written.
-    pub extended: Result<Scenario, String>,
-    /// Residuals of the calibrated and of the extended model against every recorded covariate.
-    pub residuals: Residuals,
-    /// Every effect that was tested, and what became of it.
-    pub alternatives: Vec<Alternative>,
-    /// The calibration without what was found; gains are over it.
-    pub base: CalibrationReport,
-    /// The calibrated model without what was found.
-    pub calibrated: FittedModel,
-    /// The calibrated model with what was found in its mean.
-    pub found: FittedModel,
-    /// The same without what other sessions and paths are not known to have: the model that `extended` has.
-    pub carried: FittedModel,
-    /// The geometry that suits these data best where none of the robot's own effects can be expressed: fitted
-    /// beside what was found of the instrument alone. `None` where faults of the records were undone first.
-    pub geometry_alone: Option<CalibrationReport>,
-}
-
-/// A model with its terms, to be compared with other records.
-#[derive(Debug, Clone)]
-pub struct FittedModel {
-    /// Geometry, and values in the order of the terms' parameters.
-    pub model: estimation::Model,
-    candidates: Vec<Candidate>,
-}
-
-impl FittedModel {
-    fn of(extended: &AugmentedModel<'_>) -> Self {
-        Self { model: extended.fit.solution.model.clone(), candidates: extended.candidates.clone() }
-    }
-
-    /// Its terms, in their initial states.
-    #[must_use]
-    pub fn terms(&self) -> Vec<Box<dyn model_term::ModelTerm>> {
-        crate::candidates::candidate::terms(&self.candidates)
-    }
-}
-
-fn measurements_per_run(fit: &ModelFit<'_>) -> f64 {
-    let runs = fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).count();
-    fit.records.measurements() as f64 / runs.max(1) as f64
-}
-
-const EVERY_MEASUREMENT: FitSettings = FitSettings::GEOMETRY_ONLY;
-
 /// Diagnoses one robot's sessions: the stages in order, each a function of the results before it.
 ///
 /// # Errors
 /// [`DiagnoseError`] when an id is unknown or no base model can be fitted.
 pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, DiagnoseError> {
-    diagnose_rows(datasets, None, options)
+    diagnose_log(Log { datasets, large: None }, options)
 }
 
 /// The same of stretches of a large log; what all of its rows show is said too.
@@ -160,22 +72,18 @@ pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, Di
 /// # Errors
 /// As [`diagnose`].
 pub fn diagnose_large(log: &LargeLog, options: &Options) -> Result<Diagnosis, DiagnoseError> {
-    diagnose_rows(log.datasets(), Some(log), options)
+    diagnose_log(Log { datasets: log.datasets(), large: Some(log) }, options)
 }
 
-fn diagnose_rows(
-    datasets: &[Dataset],
-    large: Option<&LargeLog>,
-    options: &Options,
-) -> Result<Diagnosis, DiagnoseError> {
+fn diagnose_log(log: Log<'_>, options: &Options) -> Result<Diagnosis, DiagnoseError> {
     if let Some(id) = options.without.iter().find(|id| !CATALOGUE.contains(&id.as_str())) {
         return Err(DiagnoseError::UnknownEffect { id: id.clone() });
     }
-    let runs = datasets.iter().map(|dataset| dataset.runs.len()).sum();
+    let runs = log.datasets.iter().map(|dataset| dataset.runs.len()).sum();
     if runs > MAX_RUNS {
         return Err(DiagnoseError::TooManyRuns { runs });
     }
-    let stages = |before_fit: BeforeFit| stages((datasets, large), options, before_fit);
+    let stages = |before_fit: BeforeFit| stages(log, options, before_fit);
     let mut before_fit = BeforeFit { min_common_clock_s: RECORDS.min_common_clock_offset_s, events: true };
     let first = match stages(before_fit) {
         // To an instrument that is precise, a clock that is off by less makes most measurements outliers.
@@ -192,15 +100,6 @@ fn diagnose_rows(
         return Ok(whole.diagnosis);
     }
     Ok(first.diagnosis)
-}
-
-/// What is taken off the records before the fit.
-#[derive(Clone, Copy)]
-struct BeforeFit {
-    /// An offset of all clocks from so many seconds on.
-    min_common_clock_s: f64,
-    /// Intervals in which robot or frame moved as no wheel says.
-    events: bool,
 }
 
 /// What the stages come to.
@@ -220,72 +119,30 @@ impl Staged {
     }
 }
 
-fn stages(
-    (datasets, large): (&[Dataset], Option<&LargeLog>),
-    options: &Options,
-    before_fit: BeforeFit,
-) -> Result<Staged, DiagnoseError> {
+fn stages(log: Log<'_>, options: &Options, before_fit: BeforeFit) -> Result<Staged, DiagnoseError> {
     let begins = |step| options.on_stage.begins(step);
     begins(Step::Motions);
-    // The sampling periods of all runs, on all cores: whoever asks for them later asks run by run.
-    datasets.par_iter().flat_map(|dataset| &dataset.runs).for_each(|run| {
-        let _ = run.odometry.t_s.sampling_period();
-    });
     let every_term = mean_terms(&options.without);
-    // Stamps that counts show to be wrong by themselves: all else is sought in records that are restamped.
-    let by_counts = Rule::StampsByCounts.finds(stamp_error_by_counts(datasets, &every_term));
-    let recorded = datasets;
-    let datasets = by_counts.as_ref().map_or(datasets, |error| &error.records[..]);
-    let of_runs = RunClock::of_all(datasets);
-    let drift = Rule::ClockDrift.finds(clock_drift(datasets, &of_runs, before_fit.min_common_clock_s));
-    let (datasets, of_runs) = drift.as_ref().map_or((datasets, &of_runs), |found| (&found.records[..], &found.clocks));
-    let clocks = clock_offsets(datasets, of_runs, before_fit.min_common_clock_s);
-    let datasets = clocks.records.as_deref().unwrap_or(datasets);
-    let odd = unknown_motions(datasets, clocks.remaining_s, uncertain_tick_s(recorded), before_fit.events);
-    let (datasets, anomalies) =
-        odd.as_ref().map_or((datasets, &[][..]), |found| (&found.records[..], &found.anomalies[..]));
+    let prepared = Prepared::of(log.datasets, &every_term, before_fit);
     begins(Step::RecordFaults);
-    // Record faults and the base fit. One fault may mask another, so that a second is sought after the first.
-    let as_recorded = EVERY_MEASUREMENT.fit(&sessions(datasets));
-    let outlying = Rule::VisibleFaultsOnly.applies(as_recorded.as_ref().is_ok_and(|base| {
-        rejected_share(base) > RECORDS.max_rejected_fraction
-            && measurements_per_run(base) < RECORDS.min_measurements_per_run
-    }));
-    let first = Rule::RecordFault.finds(fault(datasets, as_recorded.as_ref().ok(), &options.without, outlying));
-    let second;
-    let (records, base, faults): (&[Dataset], ModelFit<'_>, Vec<&Fault>) = match &first {
-        None => (datasets, as_recorded?, Vec::new()),
-        Some(first) => {
-            let base = EVERY_MEASUREMENT.fit(&sessions(&first.records))?;
-            let without = [&options.without[..], &[first.id.to_owned()]].concat();
-            second = Rule::SecondRecordFault.finds(fault(&first.records, Some(&base), &without, false));
-            match &second {
-                None => (&first.records, base, vec![first]),
-                Some(second) => {
-                    let base = EVERY_MEASUREMENT.fit(&sessions(&second.records))?;
-                    (&second.records, base, vec![first, second])
-                }
-            }
-        }
+    let as_recorded = EVERY_MEASUREMENT.fit(&sessions(prepared.records()));
+    let faults = faults(prepared.records(), as_recorded.as_ref().ok(), &options.without)?;
+    let (records, base) = match faults.last() {
+        None => (prepared.records(), as_recorded?),
+        Some(fault) => (&fault.records[..], EVERY_MEASUREMENT.fit(&sessions(&fault.records))?),
     };
     begins(Step::MeanStructure);
     let base = correlated_base(records, base);
     // Stamps that are wrong: everything that comes from them is sought in records that are restamped.
-    let sought = by_counts.is_none() && is_correlated(&base, &[]);
-    let error = Rule::StampsByResiduals.finds(sought.then(|| stamp_error(records, &base, &every_term)).flatten());
-    let whole = || by_counts.is_none().then(|| whole_stamp_error(records, &base, &every_term)).flatten();
-    let error = error.or_else(|| Rule::WholeStamps.finds(whole()));
-    let restamped = error.as_ref().and_then(|error| {
-        let fit = correlated_base(&error.records, EVERY_MEASUREMENT.fit(&sessions(&error.records)).ok()?);
-        (!Rule::StampsUndone.applies(!error.is_undone_by(&fit))).then_some((error, fit))
-    });
-    let with_stamps = (by_counts.is_some() && faults.is_empty()).then(|| with_rows_of(records, recorded));
+    let error = match prepared.by_counts {
+        Some(_) => None,
+        None => stamp_error_by_residuals(records, &base, &every_term),
+    };
+    let restamped = error.as_ref().and_then(|error| Some((error, fit_restamped(error)?)));
+    let stamped = (prepared.by_counts.is_some() && faults.is_empty()).then(|| with_rows_of(records, log.datasets));
     let (stamps, as_stamped, records, base) = match restamped {
-        Some((error, fit)) => (Some(error), Some((records, base)), &error.records[..], fit),
-        None => {
-            let fit_as_stamped = |records| Some((records, EVERY_MEASUREMENT.fit(&sessions(records)).ok()?));
-            (by_counts.as_ref(), with_stamps.as_deref().and_then(fit_as_stamped), records, base)
-        }
+        Some((error, fit)) => (Some(error), Some(AsStamped { records, base }), &error.records[..], fit),
+        None => (prepared.by_counts.as_ref(), stamped.as_deref().and_then(AsStamped::of), records, base),
     };
     let is_open = |candidate: &Candidate| {
         stamps.is_none_or(|error| error.candidate.id() != candidate.id())
@@ -295,10 +152,33 @@ fn stages(
     let mut structure = mean_structure(records, base, &catalogue);
     // Where the counts do not follow the robot at all, no small effect has a meaning: only one with which
     // they follow it, such as a clock that is off.
+    let uncorrelated = is_uncorrelated(&structure, faults.is_empty())?;
+    if uncorrelated {
+        catalogue.clear();
+        structure = mean_structure(records, structure.base, &catalogue);
+    }
+    let explained = Explained {
+        log,
+        prepared: &prepared,
+        faults: &faults,
+        stamps,
+        as_stamped,
+        records,
+        structure,
+        catalogue,
+        uncorrelated,
+    };
+    let has_events = prepared.anomalies().iter().any(|anomaly| anomaly.kind == AnomalyKind::RobotOrFrame);
+    let outlier_share = rejected_share(&explained.structure.model().fit);
+    Ok(Staged { has_events, outlier_share, diagnosis: explained.diagnosis(options) })
+}
+
+/// Whether the odometry is uncorrelated with what the instrument measured; an error where nothing can be said.
+fn is_uncorrelated(structure: &MeanStructure<'_>, has_no_fault: bool) -> Result<bool, DiagnoseError> {
     let found = &structure.found.model;
     // A large effect makes outliers of what the calibrated model alone cannot follow.
     let share = rejected_share(&found.fit);
-    if faults.is_empty() && share > RECORDS.max_rejected_fraction {
+    if has_no_fault && share > RECORDS.max_rejected_fraction {
         return Err(DiagnoseError::OdometryUncorrelated { percent: 100.0 * share });
     }
     if !structure.base.solution.converged && !found.fit.solution.converged {
@@ -309,114 +189,20 @@ fn stages(
     if is_uncorrelated && (!structure.base.unobservable.is_empty() || structure.base.shows_no_scatter()) {
         return Err(DiagnoseError::TooFewMeasurements);
     }
-    if is_uncorrelated {
-        catalogue.clear();
-        let base = structure.base;
-        structure = mean_structure(records, base, &catalogue);
-    }
-    // Records that were corrected are not those of which all rows were looked at.
-    let (log, spans) = match large.filter(|_| faults.is_empty() && stamps.is_none()) {
-        Some(large) => (large.check_rows(), large.check_spans()),
-        None => (check_rows(records), check_spans(records)),
-    };
-    let model = structure.model();
-    let names = session_names(records);
-    begins(Step::CarryOver);
-    let carry_over: Vec<CarryOver> =
-        (0..model.candidates.len()).map(|candidate| carry_over(model, candidate, &names)).collect();
-    let findings = findings(&StageResults {
-        recorded,
-        structure: &structure,
-        log: log.as_ref(),
-        spans: spans.as_ref(),
-        faults: &faults,
-        clocks: &clocks.offsets,
-        drift: drift.as_ref().map(|found| &found.drift),
-        stamps,
-        anomalies,
-        uncorrelated: is_uncorrelated,
-        without: &options.without,
-        carry_over: &carry_over,
-    });
-    begins(Step::Gain);
-    let as_stamped = as_stamped.map(|(records, base)| match structure.correlated {
-        Some(_) => THINNED.fit(&sessions(records)).unwrap_or(base),
-        None => base,
-    });
-    let before = as_stamped.as_ref().unwrap_or(&structure.base);
-    // What is reported, handed on and measured is one model.
-    let carried = carried(&structure.base, model, &findings);
-    let (gain, gain_why_null) = if !carried.candidates.is_empty() || stamps.is_some() {
-        gain_of(before, &carried, &names)
-    } else if model.candidates.is_empty() {
-        (None, Some("nothing was added to the calibrated model's mean".to_owned()))
-    } else {
-        (None, Some("no cause is certain enough for the extended model".to_owned()))
-    };
-    let drift_of_runs = if faults.is_empty() {
-        held_out_drift(&AugmentedModel::base(before), gain.as_ref().map(|_| &carried))
-    } else {
-        None
-    };
-    begins(Step::Detectability);
-    let (sensitivity, blind_to) = detectability(model, &catalogue, &mut structure.found.known.clone());
-    begins(Step::NextExperiment);
-    let next = match &options.limits {
-        None => Err("none was sought".to_owned()),
-        Some(limits) => {
-            next_experiment(records, (&structure.base, &structure.found), (model, &catalogue, &blind_to), limits)
-        }
-    };
-    let extended = crate::gain::extended_scenario::scenario_of(records, &datasets[0].robot, &faults, stamps, &carried);
-    begins(Step::Residuals);
-    let residuals = residuals(&structure.base, model);
-    let alternatives = alternatives(&structure.found, stamps, &findings);
-    let calibration_of = |model: &AugmentedModel<'_>| CalibrationReport {
-        trained_on: Vec::new(),
-        dataset: Names::of(names.clone()),
-        methods: vec![MethodReport::new("joint", &calibration(records, model), &records[0].robot)],
-    };
-    let calibrated = AugmentedModel::base(&structure.base);
-    let (base, calibrated) = (calibration_of(&calibrated), FittedModel::of(&calibrated));
-    let of_instrument = with_candidates(&structure.base, model, |_, candidate| candidate.is_of_instrument());
-    let geometry_alone = faults.is_empty().then(|| calibration_of(&of_instrument));
-    let document = Document {
-        dataset: Names::of(names.clone()),
-        verdict: text::verdict(&findings),
-        sentence: text::summary(&findings, gain.as_ref()),
-        subsample: large.map(|large| large.subsample().clone()),
-        checks: structure.checked.checks.iter().chain(&log).chain(&spans).map(TestResult::document).collect(),
-        findings: findings.iter().map(text::finding).collect(),
-        candidates: alternatives.iter().map(text::candidate).collect(),
-        blind_to,
-        sensitivity,
-        calibration: calibration_of(&carried),
-        drift: drift_of_runs,
-        gain,
-        gain_why_null,
-        nested: Vec::new(),
-        next_experiment_why_null: next.as_ref().err().cloned(),
-        next_experiment: next.ok(),
-        calibration_file: None,
-        extended_model: None,
-        extended_model_why_null: extended.as_ref().err().cloned(),
-    };
-    let (found, carried) = (FittedModel::of(model), FittedModel::of(&carried));
-    Ok(Staged {
-        has_events: anomalies.iter().any(|anomaly| anomaly.kind == AnomalyKind::RobotOrFrame),
-        outlier_share: rejected_share(&model.fit),
-        diagnosis: Diagnosis {
-            document,
-            extended,
-            residuals,
-            alternatives,
-            base,
-            calibrated,
-            found,
-            carried,
-            geometry_alone,
-        },
-    })
+    Ok(is_uncorrelated)
+}
+
+/// An error of the stamps that the residuals of a base fit show.
+fn stamp_error_by_residuals(records: &[Dataset], base: &ModelFit<'_>, every_term: &[Candidate]) -> Option<StampError> {
+    let sought = is_correlated(base, &[]);
+    let error = Rule::StampsByResiduals.finds(sought.then(|| stamp_error(records, base, every_term)).flatten());
+    error.or_else(|| Rule::WholeStamps.finds(whole_stamp_error(records, base, every_term)))
+}
+
+/// The base fit to restamped records, if it explains as much as the error of the stamps does.
+fn fit_restamped(error: &StampError) -> Option<ModelFit<'_>> {
+    let fit = correlated_base(&error.records, EVERY_MEASUREMENT.fit(&sessions(&error.records)).ok()?);
+    (!Rule::StampsUndone.applies(!error.is_undone_by(&fit))).then_some(fit)
 }
 
 /// The base fit, of thinned measurements where odometry seems uncorrelated with all of them: between frequent
@@ -430,41 +216,4 @@ fn correlated_base<'a>(records: &'a [Dataset], base: ModelFit<'a>) -> ModelFit<'
         Ok(thinned) if Rule::ThinnedIfUncorrelated.applies(determines_wheels(&thinned, &[])) => thinned,
         _ => base,
     }
-}
-
-fn gain_of(base: &ModelFit<'_>, model: &AugmentedModel<'_>, names: &[String]) -> (Option<Gain>, Option<String>) {
-    let alone = AugmentedModel::base(base);
-    match gain_by_level(&alone, model, names) {
-        Ok(gain) => (Some(gain), None),
-        Err(why) => (None, Some(why)),
-    }
-}
-
-/// The model without the terms that other sessions and paths are not known to have.
-fn carried<'a>(base: &ModelFit<'a>, model: &AugmentedModel<'a>, findings: &[Finding]) -> AugmentedModel<'a> {
-    with_candidates(base, model, |index, candidate| {
-        let of_term = findings.iter().find(|finding| finding.term == Some(index));
-        of_term.map_or(candidate.is_of_instrument(), Finding::is_in_extended_model)
-    })
-}
-
-/// The model with some of its candidates alone, refitted.
-fn with_candidates<'a>(
-    base: &ModelFit<'a>,
-    model: &AugmentedModel<'a>,
-    stays: impl Fn(usize, &Candidate) -> bool,
-) -> AugmentedModel<'a> {
-    let of = model.candidates.iter().enumerate().filter(|(index, candidate)| stays(*index, candidate));
-    let candidates: Vec<Candidate> = of.map(|(_, candidate)| candidate.clone()).collect();
-    if candidates.len() == model.candidates.len() {
-        return model.clone();
-    }
-    let others = if candidates.is_empty() { None } else { refit(base, model, candidates) };
-    others.unwrap_or_else(|| AugmentedModel::base(base))
-}
-
-/// The calibration with what was found in the model.
-fn calibration(datasets: &[Dataset], extended: &AugmentedModel<'_>) -> Result<Calibration, CalibError> {
-    let covariance = extended.fit.covariance(&mut crate::candidates::candidate::terms(&extended.candidates));
-    calibrated_drive(&extended.fit, covariance.as_ref(), datasets[0].robot.ticks_per_rev)
 }

@@ -14,7 +14,7 @@ use rules::Rule;
 
 use crate::candidates::candidate::terms;
 use crate::candidates::cause::{Basis, Cause, Doubt};
-use crate::checks::check::{Check, Component, ResidualPersistence};
+use crate::checks::check::{Check, Component, ResidualPersistence, TestResult};
 use crate::checks::errors_at_rest::{ErrorsAtRest, errors_at_rest};
 use crate::checks::outlier_attribution::{ErrorSource, log_likelihoods};
 use crate::checks::residual_tests::residual_persistence;
@@ -29,49 +29,54 @@ use crate::fits::statistics::{p_of_chi_square, p_of_z};
 use crate::search::mean_structure::MeanStructure;
 use crate::settings::{LEVELS, RESIDUALS};
 
+/// Autocorrelated errors, with what they are while the robot stands.
+#[derive(Clone, Copy)]
+struct LastingErrors {
+    coefficient: f64,
+    /// Standard errors of the coefficient.
+    sigmas: f64,
+    at_rest: ErrorsAtRest,
+}
+
+impl LastingErrors {
+    /// An instrument errs while the robot stands, too, unless its errors go with the place.
+    fn of(structure: &MeanStructure<'_>, recorded: &[Dataset]) -> Option<Self> {
+        let (coefficient, sigmas) = structure.correlated.filter(|(coefficient, _)| *coefficient > 0.0)?;
+        let at_rest = Rule::ErrorsAtRest.changes(ErrorsAtRest::Autocorrelated, errors_at_rest(recorded, coefficient));
+        Some(Self { coefficient, sigmas, at_rest })
+    }
+
+    /// The finding. Where something else is found too, `may_be_rest`: this may be the rest of it.
+    fn finding(self, may_be_rest: bool, without_ids: &[String]) -> Finding {
+        let mut causes = with_sign(Sign::AutocorrelatedErrors, without_ids);
+        if self.at_rest == ErrorsAtRest::White {
+            causes.insert(0, Cause::Unknown);
+        } else if !causes.is_empty() && (may_be_rest || self.at_rest == ErrorsAtRest::WhiteOrSlow) {
+            causes.push(Cause::Unknown);
+        }
+        let basis = Basis::Autocorrelated(self.coefficient, self.at_rest);
+        finding::of_causes(causes, p_of_z(self.sigmas), BTreeMap::new(), basis)
+    }
+}
+
 /// Scatter that failed checks show, and the datasets as they were recorded.
 pub(crate) fn scatter(structure: &MeanStructure<'_>, recorded: &[Dataset], without_ids: &[String]) -> Vec<Finding> {
-    let mut findings = Vec::new();
     let outliers = structure.checked.outliers;
     let tests = &structure.checked.checks;
     let rejected = outliers.isolated + outliers.persistent;
     if rejected as f64 > RESIDUALS.max_outlier_fraction * (outliers.measurements + rejected) as f64 {
         // The model does not follow the robot at all: that has no name.
-        return findings;
+        return Vec::new();
     }
-    // Autocorrelated errors, with what they are while the robot stands: an instrument errs then, too, unless
-    // its errors go with the place.
-    let autocorrelated =
-        structure.correlated.filter(|(coefficient, _)| *coefficient > 0.0).map(|(coefficient, sigmas)| {
-            let at_rest = errors_at_rest(recorded, coefficient);
-            (coefficient, sigmas, Rule::ErrorsAtRest.changes(ErrorsAtRest::Autocorrelated, at_rest))
-        });
-    let may_be_motions = autocorrelated.is_some_and(|(.., at_rest)| at_rest != ErrorsAtRest::Autocorrelated);
+    let lasting = LastingErrors::of(structure, recorded);
     let turns = Rule::TurnScatter.finds(of_turns(structure, without_ids));
-    let p_of_dependence = tests.iter().filter(|test| test.shows_dependence());
-    let p_of_dependence = p_of_dependence.map(|test| test.p_value).fold(1.0, f64::min);
-    let tails = tests.iter().filter(|test| matches!(test.check, Check::Tails(_) | Check::Outliers));
-    let tails = tails.map(|test| test.p_value).fold(1.0, f64::min);
+    let least = |of: &dyn Fn(&TestResult) -> bool| {
+        tests.iter().filter(|test| of(test)).map(|test| test.p_value).fold(1.0, f64::min)
+    };
+    let p_of_dependence = least(&TestResult::shows_dependence);
+    let tails = least(&|test| matches!(test.check, Check::Tails(_) | Check::Outliers));
     let is_dependent = p_of_dependence < tails.max(RESIDUALS.dependence_beyond_tails_level);
-    // After the end of a run nothing follows that could be back.
-    let has_successors =
-        structure.base.selections.first().is_some_and(|taken| taken.mean_measurements(&structure.base.records) >= 2.0);
-    let are_isolated = has_successors
-        && outliers.p_value < RESIDUALS.noise_effect_level
-        && outliers.isolated >= RESIDUALS.isolated_to_persistent_ratio * outliers.persistent;
-    if Rule::IsolatedErrors.applies(are_isolated) {
-        let share = outliers.isolated as f64 / (outliers.measurements + rejected) as f64;
-        let value = Value { value: share, sigma: None, unit: "1".to_owned() };
-        let of = outliers.measurements + rejected;
-        let mut causes = with_sign(Sign::IsolatedErrors, without_ids);
-        // Where motions err for a while at a time, some of these errors are large.
-        if !causes.is_empty() && may_be_motions {
-            causes.push(Cause::Unknown);
-        }
-        let parameters = BTreeMap::from([("probability".to_owned(), value)]);
-        let basis = Basis::IsolatedErrors(outliers.isolated, of);
-        findings.push(finding::of_causes(causes, outliers.p_value, parameters, basis));
-    }
+    let mut findings: Vec<Finding> = isolated_errors(structure, lasting, without_ids).into_iter().collect();
     if Rule::DependentResiduals.applies(is_dependent) {
         // Large errors that depend on what was driven are no noise effect. Turn scatter correlates with
         // everything that turns, but less than its own significance.
@@ -79,67 +84,85 @@ pub(crate) fn scatter(structure: &MeanStructure<'_>, recorded: &[Dataset], witho
         return findings;
     }
     if findings.is_empty() {
-        // Tails of one component, and what follows them, say whether the robot jumped or the instrument
-        // erred.
-        let tails = [(Component::Heading, 2, Sign::HeadingJumps), (Component::Along, 0, Sign::DistanceJumps)];
-        let test = |component: Component| tests.iter().find(|test| test.check == Check::Tails(component));
-        let kurtosis = |component: Component| test(component).map_or(0.0, |test| test.statistic);
-        let has_outliers =
-            outliers.p_value < RESIDUALS.noise_effect_level && (outliers.persistent > 0 || !has_successors);
-        let heaviest = tails.into_iter().max_by(|a, b| kurtosis(a.0).total_cmp(&kurtosis(b.0)));
-        let jump = heaviest.and_then(|(component, number, sign)| {
-            // Tails that are lighter than normal ones are no large errors.
-            let fails = test(component).filter(|test| !test.passes && test.statistic > RESIDUALS.normal_kurtosis);
-            let p_value = fails.map(|test| test.p_value).or(has_outliers.then_some(outliers.p_value))?;
-            Some((p_value, residual_persistence(&structure.found.model, number), sign))
-        });
-        if let Some((p_value, persistence, sign)) = Rule::LargeErrors.finds(jump) {
-            let named = |signs: &[Sign]| {
-                let mut ids: Vec<&'static str> = Vec::new();
-                for id in signs.iter().flat_map(|sign| finding::with_sign(*sign, without_ids)) {
-                    if !ids.contains(&id) {
-                        ids.push(id);
-                    }
-                }
-                ids
-            };
-            // What jumps ahead may turn as well: a bump costs one wheel its way.
-            let signs: &[Sign] = if sign == Sign::DistanceJumps {
-                &[Sign::HeadingJumps, Sign::DistanceJumps]
-            } else {
-                &[Sign::HeadingJumps]
-            };
-            let (jumps, errors) = (named(signs), named(&[Sign::IsolatedErrors, Sign::TailsAtLowSpeed]));
-            let (ids, any): (_, &[ErrorSource]) = match persistence {
-                ResidualPersistence::Persistent => (jumps, &[ErrorSource::Robot]),
-                ResidualPersistence::Reverting => (errors, &[ErrorSource::Instrument]),
-                ResidualPersistence::Undecided => {
-                    ([&jumps[..], &errors].concat(), &[ErrorSource::Robot, ErrorSource::Instrument])
-                }
-            };
-            // Tails have many causes.
-            let or_unlisted = persistence == ResidualPersistence::Undecided;
-            let likelihoods = Rule::Attribution.finds(log_likelihoods(structure.model(), &ids, any));
-            let (likelihoods, any) = likelihoods.unwrap_or_else(|| (vec![0.0; ids.len()], f64::NEG_INFINITY));
-            let likely: Vec<_> = ids.into_iter().zip(likelihoods).collect();
-            let basis = Basis::LargeErrors(persistence);
-            findings.push(finding::of_likely_scatter(likely, any, or_unlisted, p_value, basis));
-        }
+        findings.extend(Rule::LargeErrors.finds(large_errors(structure, without_ids)));
     }
-    if let Some((coefficient, sigmas, at_rest)) = autocorrelated {
-        let mut causes = with_sign(Sign::AutocorrelatedErrors, without_ids);
-        // Where something else is found too, it may be that this is the rest of it.
-        let may_be_rest = !structure.found.model.candidates.is_empty() || turns.is_some();
-        if at_rest == ErrorsAtRest::White {
-            causes.insert(0, Cause::Unknown);
-        } else if !causes.is_empty() && (may_be_rest || at_rest == ErrorsAtRest::WhiteOrSlow) {
-            causes.push(Cause::Unknown);
-        }
-        let basis = Basis::Autocorrelated(coefficient, at_rest);
-        findings.push(finding::of_causes(causes, p_of_z(sigmas), BTreeMap::new(), basis));
-    }
+    let may_be_rest = !structure.found.model.candidates.is_empty() || turns.is_some();
+    findings.extend(lasting.map(|lasting| lasting.finding(may_be_rest, without_ids)));
     findings.extend(turns);
     findings
+}
+
+/// Whether runs have successive measurements: after the end of a run nothing follows that could be back.
+fn has_successors(structure: &MeanStructure<'_>) -> bool {
+    let taken = structure.base.selections.first();
+    taken.is_some_and(|taken| taken.mean_measurements(&structure.base.records) >= 2.0)
+}
+
+/// Outliers after which the next measurement is back.
+fn isolated_errors(
+    structure: &MeanStructure<'_>,
+    lasting: Option<LastingErrors>,
+    without_ids: &[String],
+) -> Option<Finding> {
+    let outliers = structure.checked.outliers;
+    let are_isolated = has_successors(structure)
+        && outliers.p_value < RESIDUALS.noise_effect_level
+        && outliers.isolated >= RESIDUALS.isolated_to_persistent_ratio * outliers.persistent;
+    Rule::IsolatedErrors.applies(are_isolated).then(|| {
+        let all = outliers.measurements + outliers.isolated + outliers.persistent;
+        let value = Value { value: outliers.isolated as f64 / all as f64, sigma: None, unit: "1".to_owned() };
+        let mut causes = with_sign(Sign::IsolatedErrors, without_ids);
+        // Where motions err for a while at a time, some of these errors are large.
+        let may_be_motions = lasting.is_some_and(|lasting| lasting.at_rest != ErrorsAtRest::Autocorrelated);
+        if !causes.is_empty() && may_be_motions {
+            causes.push(Cause::Unknown);
+        }
+        let parameters = BTreeMap::from([("probability".to_owned(), value)]);
+        finding::of_causes(causes, outliers.p_value, parameters, Basis::IsolatedErrors(outliers.isolated, all))
+    })
+}
+
+/// Large errors: tails of one component, and what follows them, say whether the robot jumped or the
+/// instrument erred.
+fn large_errors(structure: &MeanStructure<'_>, without_ids: &[String]) -> Option<Finding> {
+    let (tests, outliers) = (&structure.checked.checks, structure.checked.outliers);
+    let test = |component: Component| tests.iter().find(|test| test.check == Check::Tails(component));
+    let kurtosis = |component: Component| test(component).map_or(0.0, |test| test.statistic);
+    // What jumps ahead may turn as well: a bump costs one wheel its way.
+    let tails: [(Component, usize, &[Sign]); 2] = [
+        (Component::Heading, 2, &[Sign::HeadingJumps]),
+        (Component::Along, 0, &[Sign::HeadingJumps, Sign::DistanceJumps]),
+    ];
+    let (component, number, signs) = tails.into_iter().max_by(|a, b| kurtosis(a.0).total_cmp(&kurtosis(b.0)))?;
+    // Tails that are lighter than normal ones are no large errors.
+    let fails = test(component).filter(|test| !test.passes && test.statistic > RESIDUALS.normal_kurtosis);
+    let has_outliers =
+        outliers.p_value < RESIDUALS.noise_effect_level && (outliers.persistent > 0 || !has_successors(structure));
+    let p_value = fails.map(|test| test.p_value).or(has_outliers.then_some(outliers.p_value))?;
+    let persistence = residual_persistence(&structure.found.model, number);
+    let named = |signs: &[Sign]| {
+        let mut ids: Vec<&'static str> = Vec::new();
+        for id in signs.iter().flat_map(|sign| finding::with_sign(*sign, without_ids)) {
+            if !ids.contains(&id) {
+                ids.push(id);
+            }
+        }
+        ids
+    };
+    let (jumps, errors) = (named(signs), named(&[Sign::IsolatedErrors, Sign::TailsAtLowSpeed]));
+    let (ids, any): (_, &[ErrorSource]) = match persistence {
+        ResidualPersistence::Persistent => (jumps, &[ErrorSource::Robot]),
+        ResidualPersistence::Reverting => (errors, &[ErrorSource::Instrument]),
+        ResidualPersistence::Undecided => {
+            ([&jumps[..], &errors].concat(), &[ErrorSource::Robot, ErrorSource::Instrument])
+        }
+    };
+    let likelihoods = Rule::Attribution.finds(log_likelihoods(structure.model(), &ids, any));
+    let (likelihoods, any) = likelihoods.unwrap_or_else(|| (vec![0.0; ids.len()], f64::NEG_INFINITY));
+    let likely: Vec<_> = ids.into_iter().zip(likelihoods).collect();
+    // Tails have many causes.
+    let or_unlisted = persistence == ResidualPersistence::Undecided;
+    Some(finding::of_likely_scatter(likely, any, or_unlisted, p_value, Basis::LargeErrors(persistence)))
 }
 
 /// Effects of the catalogue that show by a sign, without those taken out, as causes.

@@ -45,7 +45,7 @@ pub(crate) struct StageResults<'e, 'a> {
     /// The tests of the log itself: its rows, and its time span.
     pub(crate) log: Option<&'e TestResult>,
     pub(crate) spans: Option<&'e TestResult>,
-    pub(crate) faults: &'e [&'e Fault],
+    pub(crate) faults: &'e [Fault],
     pub(crate) clocks: &'e [ClockOffset],
     /// A drift of all clocks that was set right before the fit.
     pub(crate) drift: Option<&'e ClockDrift>,
@@ -101,7 +101,7 @@ pub(crate) fn findings(results: &StageResults<'_, '_>) -> Vec<Finding> {
 }
 
 fn record_faults(results: &StageResults<'_, '_>, _: Vec<Finding>) -> Vec<Finding> {
-    results.faults.iter().map(|fault| finding::of_fault(fault)).collect()
+    results.faults.iter().map(finding::of_fault).collect()
 }
 
 /// Extrinsics that were fitted before effects were sought.

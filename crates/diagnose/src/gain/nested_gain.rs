@@ -11,13 +11,15 @@ use estimation::{EndError, FitSettings};
 use kinematics::Pose;
 
 use crate::carry_over::{Level, Units};
-use crate::diagnosis::{DiagnoseError, Diagnosis, Options, diagnose};
+use crate::diagnosis::{DiagnoseError, diagnose};
 use crate::document::{Compared, GainLevel, HeldOutUnit, NestedGain};
 use crate::fits::augmented_model::AugmentedModel;
 use crate::gain::extended_model::ExtendedModel;
 use crate::gain::{HeldOut, drift};
+use crate::options::Options;
 use crate::records::names::session_names;
 use crate::records::record_faults::sessions;
+use crate::report::Diagnosis;
 
 /// The gains with whole kinds of path and whole sessions left out of the diagnosis, where there are several.
 /// A diagnosis each costs as much as that of all data.

@@ -8,6 +8,7 @@ pub(crate) mod log_rows;
 pub(crate) mod names;
 pub(crate) mod part_of_runs;
 pub(crate) mod pose_windows;
+pub(crate) mod prepared;
 pub(crate) mod record_faults;
 pub(crate) mod same_measurements;
 pub(crate) mod stamp_errors;

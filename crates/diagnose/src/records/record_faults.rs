@@ -6,8 +6,9 @@
 
 use dataset::{Dataset, Session};
 use effects::{CATALOGUE, Hypothesis, RecordCorrection, hypothesis};
-use estimation::{Column, FitSettings, ModelFit, NoiseComponent};
+use estimation::{Column, EstimationError, FitSettings, ModelFit, NoiseComponent};
 use rayon::prelude::*;
+use rules::Rule;
 
 use crate::candidates::candidate::{Candidate, terms};
 use crate::fits::augmented_model::{cost, count};
@@ -40,14 +41,37 @@ pub(crate) fn sessions(datasets: &[Dataset]) -> Vec<Session<'_>> {
     datasets.iter().map(Dataset::session).collect()
 }
 
-/// The fault that the log itself shows, or else that makes the data far likelier, if there is one;
-/// `outlying` leaves it at the former.
-pub(crate) fn fault(
-    datasets: &[Dataset],
+/// The faults of some records, of which `base` is the fit: one may mask another, so that a second is sought
+/// after the first.
+///
+/// # Errors
+/// [`EstimationError`] where records without a fault have no fit.
+pub(crate) fn faults(
+    records: &[Dataset],
     base: Option<&ModelFit<'_>>,
     without: &[String],
-    outlying: bool,
-) -> Option<Fault> {
+) -> Result<Vec<Fault>, EstimationError> {
+    let outlying = Rule::VisibleFaultsOnly.applies(base.is_some_and(|base| {
+        rejected_share(base) > RECORDS.max_rejected_fraction
+            && measurements_per_run(base) < RECORDS.min_measurements_per_run
+    }));
+    let Some(first) = Rule::RecordFault.finds(fault(records, base, without, outlying)) else { return Ok(Vec::new()) };
+    let second = {
+        let base = PLAIN.fit(&sessions(&first.records))?;
+        let without = [without, &[first.id.to_owned()]].concat();
+        Rule::SecondRecordFault.finds(fault(&first.records, Some(&base), &without, false))
+    };
+    Ok([Some(first), second].into_iter().flatten().collect())
+}
+
+fn measurements_per_run(fit: &ModelFit<'_>) -> f64 {
+    let runs = fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).count();
+    fit.records.measurements() as f64 / runs.max(1) as f64
+}
+
+/// The fault that the log itself shows, or else that makes the data far likelier, if there is one;
+/// `outlying` leaves it at the former.
+fn fault(datasets: &[Dataset], base: Option<&ModelFit<'_>>, without: &[String], outlying: bool) -> Option<Fault> {
     let sound = base.is_some_and(is_sound);
     // The most specific trace first: jumps that are undone at once are also wraps.
     let sought: Vec<&'static str> = CATALOGUE

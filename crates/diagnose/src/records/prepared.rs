@@ -1,0 +1,70 @@
+//! Records as faults and effects are sought in them: stamps that the counts show to be wrong, clocks, and what
+//! does not belong are set right before any fit.
+
+use dataset::Dataset;
+use rayon::prelude::*;
+use rules::Rule;
+
+use crate::candidates::candidate::Candidate;
+use crate::records::clock_drift::{DriftFound, clock_drift};
+use crate::records::clock_offsets::{Clocks, clock_offsets};
+use crate::records::clock_profile::RunClock;
+use crate::records::stamp_errors::{StampError, stamp_error_by_counts, uncertain_tick_s};
+use crate::records::unknown_motion::{Anomaly, UnknownMotions, unknown_motions};
+
+/// What is taken off the records before the fit.
+#[derive(Clone, Copy)]
+pub(crate) struct BeforeFit {
+    /// An offset of all clocks from so many seconds on.
+    pub(crate) min_common_clock_s: f64,
+    /// Intervals in which robot or frame moved as no wheel says.
+    pub(crate) events: bool,
+}
+
+/// The records with what was set right in them, step after step.
+pub(crate) struct Prepared<'d> {
+    recorded: &'d [Dataset],
+    /// Stamps that the counts show to be wrong.
+    pub(crate) by_counts: Option<StampError>,
+    /// A drift of all clocks.
+    pub(crate) drift: Option<DriftFound>,
+    /// Clocks that are far apart.
+    pub(crate) clocks: Clocks,
+    odd: Option<UnknownMotions>,
+}
+
+impl<'d> Prepared<'d> {
+    /// Of records as they were read.
+    pub(crate) fn of(recorded: &'d [Dataset], every_term: &[Candidate], before_fit: BeforeFit) -> Self {
+        let BeforeFit { min_common_clock_s, events } = before_fit;
+        // The sampling periods of all runs, on all cores: whoever asks for them later asks run by run.
+        recorded.par_iter().flat_map(|dataset| &dataset.runs).for_each(|run| {
+            let _ = run.odometry.t_s.sampling_period();
+        });
+        let by_counts = Rule::StampsByCounts.finds(stamp_error_by_counts(recorded, every_term));
+        let datasets = by_counts.as_ref().map_or(recorded, |error| &error.records[..]);
+        let of_runs = RunClock::of_all(datasets);
+        let drift = Rule::ClockDrift.finds(clock_drift(datasets, &of_runs, min_common_clock_s));
+        let (datasets, of_runs) = match &drift {
+            Some(found) => (&found.records[..], &found.clocks),
+            None => (datasets, &of_runs),
+        };
+        let clocks = clock_offsets(datasets, of_runs, min_common_clock_s);
+        let datasets = clocks.records.as_deref().unwrap_or(datasets);
+        let odd = unknown_motions(datasets, clocks.remaining_s, uncertain_tick_s(recorded), events);
+        Self { recorded, by_counts, drift, clocks, odd }
+    }
+
+    /// The records after the last step that changed them.
+    pub(crate) fn records(&self) -> &[Dataset] {
+        let odd = self.odd.as_ref().map(|odd| &odd.records[..]);
+        let drift = self.drift.as_ref().map(|drift| &drift.records[..]);
+        let by_counts = self.by_counts.as_ref().map(|error| &error.records[..]);
+        odd.or(self.clocks.records.as_deref()).or(drift).or(by_counts).unwrap_or(self.recorded)
+    }
+
+    /// Runs and intervals that do not belong.
+    pub(crate) fn anomalies(&self) -> &[Anomaly] {
+        self.odd.as_ref().map_or(&[], |odd| &odd.anomalies)
+    }
+}
