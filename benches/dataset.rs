@@ -16,7 +16,7 @@ use std::time::Instant;
 
 use calib::methods::joint::Joint;
 use dataset::{Blocks, Existing, RunByRun, Writer, import, read_ahead};
-use diagnose::{LargeLog, Options, diagnose, diagnose_large};
+use diagnose::{LargeLog, Options, diagnose};
 use estimation::{is_large, many_rows};
 use peak_alloc::PeakAlloc;
 use rand::{RngExt, SeedableRng};
@@ -122,7 +122,7 @@ fn diagnosed(megabytes: usize, rows: usize, lasts: f64) {
         if many_rows(&blocks) {
             let log = LargeLog::read(&mut blocks).expect("readable");
             (taken, read_s) = (log.subsample().diagnosed_rows, processor_s() - started_s);
-            drop(diagnose_large(&log, &Options::default()).expect("diagnosed"));
+            drop(diagnose(&log, &Options::default()).expect("diagnosed"));
         } else {
             let dataset = dataset::read(&set).expect("readable").dataset;
             (taken, read_s) = (runs * rows, processor_s() - started_s);

@@ -172,17 +172,6 @@ fn run(cli: &Cli, arguments: &[OsString], terminal: &Terminal) -> u8 {
             return 1;
         }
     };
-    let code = run_command(cli, terminal);
-    match ablation.map_or(Ok(()), |ablation| ablation.end()) {
-        Ok(()) => code,
-        Err(failure) => {
-            terminal.failure(&failure.to_string());
-            1
-        }
-    }
-}
-
-fn run_command(cli: &Cli, terminal: &Terminal) -> u8 {
     let Some(command) = &cli.command else {
         terminal.remark(help::first_steps());
         terminal.usage_error("no subcommand is given; yair --help lists them");
@@ -209,7 +198,8 @@ fn run_command(cli: &Cli, terminal: &Terminal) -> u8 {
         Command::Completions(arguments) => manual::completions(arguments, grammar(), terminal),
         Command::Man(arguments) => manual::man(arguments, grammar(), terminal),
     };
-    match outcome {
+    let ended = ablation.map_or(Ok(()), |ablation| ablation.end());
+    match outcome.and_then(|code| ended.map(|()| code)) {
         Ok(code) => number(code),
         Err(failure) => {
             terminal.failure(&failure.to_string());

@@ -50,7 +50,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     check::before(log.datasets(), terminal);
     let bar = terminal.stages("diagnose");
     let options = Options { without: arguments.without.clone(), on_stage: shown_on(bar.clone()), ..Options::default() };
-    let diagnosis = log.diagnose(&options);
+    let diagnosis = ::diagnose::diagnose(&log, &options);
     bar.finish_and_clear();
     let mut diagnosis = diagnosis?;
     if arguments.nested {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use ::diagnose::{DiagnoseError, Diagnosis, LargeLog, Options, diagnose, diagnose_large};
+use ::diagnose::LargeLog;
 use dataset::{Blocks, Dataset};
 use estimation::many_rows;
 
@@ -42,12 +42,13 @@ impl Log {
             Self::Large(log) => log.datasets(),
         }
     }
+}
 
-    /// Their diagnosis.
-    pub(crate) fn diagnose(&self, options: &Options) -> Result<Diagnosis, DiagnoseError> {
-        match self {
-            Self::Whole(datasets) => diagnose(datasets, options),
-            Self::Large(log) => diagnose_large(log, options),
+impl<'l> From<&'l Log> for ::diagnose::Log<'l> {
+    fn from(log: &'l Log) -> Self {
+        match log {
+            Log::Whole(datasets) => Self::from(datasets),
+            Log::Large(large) => Self::from(&**large),
         }
     }
 }

@@ -125,7 +125,7 @@ fn of_data(
     let bar = terminal.stages("plan");
     let options =
         Options { without: arguments.without.clone(), limits: Some(*limits), on_stage: shown_on(bar.clone()) };
-    let diagnosis = log.diagnose(&options);
+    let diagnosis = ::diagnose::diagnose(&log, &options);
     bar.finish_and_clear();
     let Diagnosis { document, extended, .. } = diagnosis?;
     terminal.say(&document.sentence)?;

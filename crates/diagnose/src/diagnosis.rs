@@ -8,7 +8,6 @@ use rules::Rule;
 use crate::candidates::candidate::{Candidate, mean_terms};
 use crate::findings::extrinsics;
 use crate::options::Options;
-use crate::records::large_log::LargeLog;
 use crate::records::prepared::{BeforeFit, Prepared};
 use crate::records::record_faults::{determines_wheels, faults, is_correlated, rejected_share, sessions};
 use crate::records::stamp_errors::{StampError, stamp_error, whole_stamp_error, with_rows_of};
@@ -59,23 +58,13 @@ pub enum DiagnoseError {
     NoFit(#[from] EstimationError),
 }
 
-/// Diagnoses one robot's sessions: the stages in order, each a function of the results before it.
+/// Diagnoses a log: one robot's sessions, or stretches of a large log, of which all rows are said too. The
+/// stages in order, each a function of the results before it.
 ///
 /// # Errors
 /// [`DiagnoseError`] when an id is unknown or no base model can be fitted.
-pub fn diagnose(datasets: &[Dataset], options: &Options) -> Result<Diagnosis, DiagnoseError> {
-    diagnose_log(Log { datasets, large: None }, options)
-}
-
-/// The same of stretches of a large log; what all of its rows show is said too.
-///
-/// # Errors
-/// As [`diagnose`].
-pub fn diagnose_large(log: &LargeLog, options: &Options) -> Result<Diagnosis, DiagnoseError> {
-    diagnose_log(Log { datasets: log.datasets(), large: Some(log) }, options)
-}
-
-fn diagnose_log(log: Log<'_>, options: &Options) -> Result<Diagnosis, DiagnoseError> {
+pub fn diagnose<'l>(log: impl Into<Log<'l>>, options: &Options) -> Result<Diagnosis, DiagnoseError> {
+    let log = log.into();
     if let Some(id) = options.without.iter().find(|id| !CATALOGUE.contains(&id.as_str())) {
         return Err(DiagnoseError::UnknownEffect { id: id.clone() });
     }

@@ -30,7 +30,7 @@ mod small_robot;
 mod tests;
 
 pub use checks::residuals::{Bin, Component, Profile, Residuals, ResidualsByCovariate};
-pub use diagnosis::{DiagnoseError, diagnose, diagnose_large};
+pub use diagnosis::{DiagnoseError, diagnose};
 pub use document::{
     Blind, CandidateCause, Check, Compared, Differences, Document, Drift, Finding, Gain, GainLevel, HeldOutDrift,
     HeldOutUnit, LevelGain, NestedGain, NextExperiment, PlannedSession, Predicted, RowFault, Smallest, Subsample,
@@ -42,7 +42,7 @@ pub use gain::nested_gain::nested_gains;
 pub use options::Options;
 pub use plan::{HANDLING_S, Limits, MINUTES, PlanError, ScenarioPlan, moved_over_m, plan_scenario};
 pub use records::large_log::LargeLog;
-pub use report::{Diagnosis, FittedModel};
+pub use report::{Diagnosis, FittedModel, Log};
 pub use search::rivals::Refusal;
 pub use settings::levels::CHECKS_LEVEL;
 pub use stage::{OnStage, Stage};

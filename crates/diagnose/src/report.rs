@@ -78,10 +78,34 @@ impl FittedModel {
 }
 
 /// A log as it is diagnosed: its datasets, and the large log whose stretches they are.
-#[derive(Clone, Copy)]
-pub(crate) struct Log<'l> {
+#[derive(Debug, Clone, Copy)]
+pub struct Log<'l> {
     pub(crate) datasets: &'l [Dataset],
     pub(crate) large: Option<&'l LargeLog>,
+}
+
+impl<'l> From<&'l [Dataset]> for Log<'l> {
+    fn from(datasets: &'l [Dataset]) -> Self {
+        Self { datasets, large: None }
+    }
+}
+
+impl<'l> From<&'l Vec<Dataset>> for Log<'l> {
+    fn from(datasets: &'l Vec<Dataset>) -> Self {
+        Self::from(&datasets[..])
+    }
+}
+
+impl<'l, const N: usize> From<&'l [Dataset; N]> for Log<'l> {
+    fn from(datasets: &'l [Dataset; N]) -> Self {
+        Self::from(&datasets[..])
+    }
+}
+
+impl<'l> From<&'l LargeLog> for Log<'l> {
+    fn from(log: &'l LargeLog) -> Self {
+        Self { datasets: log.datasets(), large: Some(log) }
+    }
 }
 
 /// Records with their stamps as they were, and the base fit to them: what a gain is over.

@@ -127,10 +127,20 @@ impl Searched<'_> {
     }
 }
 
-/// The search before measurements are thinned.
+/// The effects with a base fit, and one sparse term against them. Where instants are noisy beside the effects,
+/// the base fit with that noise, and the effects with it: motion that stamps do not tell resembles effects
+/// that grow with speed.
 fn search_among_all<'a>(base: ModelFit<'a>, catalogue: &[Candidate]) -> Searched<'a> {
-    let (base, model) = search_beside_timing_noise(base, catalogue);
-    let model = compare_with_sparse(&base, model);
+    let found = search(FitCache::of(&base), catalogue, LEVELS.scan_level);
+    let (base, found) = match Rule::TimingNoise.finds(noisy_base(&base, &found.model)) {
+        None => (base, found),
+        Some(noisy) => {
+            drop((base, found)); // their fits are large
+            let found = search(FitCache::of(&noisy), catalogue, LEVELS.scan_level);
+            (noisy, found)
+        }
+    };
+    let model = compare_with_sparse(&base, MeanModel::of_effects(found));
     Searched { base, model, correlated: None }
 }
 
@@ -180,20 +190,6 @@ fn correlation_by_part(datasets: &[Dataset], base: &ModelFit<'_>, catalogue: &[C
         check(&AugmentedModel { fit, candidates })
     };
     (!is_white(&checked)).then_some(checked.correlation)
-}
-
-/// The effects beside a base fit. Where instants are noisy beside them, the base fit with that noise, and the
-/// effects beside it: motion that stamps do not tell resembles effects that grow with speed.
-fn search_beside_timing_noise<'a>(base: ModelFit<'a>, catalogue: &[Candidate]) -> (ModelFit<'a>, MeanModel<'a>) {
-    let found = search(FitCache::of(&base), catalogue, LEVELS.scan_level);
-    match Rule::TimingNoise.finds(noisy_base(&base, &found.model)) {
-        None => (base, MeanModel::of_effects(found)),
-        Some(noisy) => {
-            drop((base, found)); // their fits are large
-            let found = search(FitCache::of(&noisy), catalogue, LEVELS.scan_level);
-            (noisy, MeanModel::of_effects(found))
-        }
-    }
 }
 
 /// The base fit with the noise of instants that is left beside a model's effects; `None` where none is.
