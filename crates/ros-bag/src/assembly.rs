@@ -98,8 +98,7 @@ impl Assembly<'_> {
         let readings = both.truth.as_ref().unwrap_or(&no_poses);
         let ordered = readings.in_order(self.clocks[1], is_cut, warnings)?;
         let wheels = wheel_values(both, &wheel_rows, warnings)?;
-        let has_heading = has_headings(readings, warnings);
-        warn_of_poses(readings, warnings);
+        let has_heading = check_poses(readings, warnings);
         let mut poses = PoseRows { readings, ordered, has_heading, taken: BTreeSet::new() };
 
         let step_s = |from: usize, to: usize| seconds(wheel_rows[from].1, wheel_rows[to].1);
@@ -200,8 +199,8 @@ fn wheel_values(
     Ok(wheels)
 }
 
-/// Whether the headings of poses say something.
-fn has_headings(poses: &Rows<TruthReading>, warnings: &mut Vec<String>) -> bool {
+/// Warns of what is doubtful of poses; gives whether their headings say something.
+fn check_poses(poses: &Rows<TruthReading>, warnings: &mut Vec<String>) -> bool {
     let has_heading = !is_heading_constant(&poses.values);
     if !has_heading {
         warnings.push(format!(
@@ -209,11 +208,6 @@ fn has_headings(poses: &Rows<TruthReading>, warnings: &mut Vec<String>) -> bool 
             poses.topic
         ));
     }
-    has_heading
-}
-
-/// What makes the poses of an instrument doubtful.
-fn warn_of_poses(poses: &Rows<TruthReading>, warnings: &mut Vec<String>) {
     let tilt_rad = poses.values.iter().map(|reading| reading.tilt_rad).fold(0.0, f64::max);
     if tilt_rad > MAX_TILT_RAD {
         warnings.push(format!(
@@ -224,6 +218,7 @@ fn warn_of_poses(poses: &Rows<TruthReading>, warnings: &mut Vec<String>) {
     }
     let doubt = truth::doubt_of_covariances(&poses.values);
     warnings.extend(doubt.map(|doubt| format!("topic {}: {doubt}", poses.topic)));
+    has_heading
 }
 
 /// What is said of the longest gap in rates of wheels.
