@@ -219,6 +219,7 @@ impl Staged {
     }
 }
 
+#[expect(clippy::too_many_lines, reason = "the stages of a diagnosis in their order; to be split")]
 fn stages(
     (datasets, large): (&[Dataset], Option<&LargeLog>),
     options: &Options,

@@ -33,6 +33,7 @@ use crate::statistics::{p_of_chi_square, p_of_z};
 use crate::turn_to_turn::differs_from_turn_to_turn;
 
 /// Scatter that failed checks show, and the datasets as they were recorded.
+#[expect(clippy::too_many_lines, reason = "one check after the other; to be split")]
 pub(crate) fn scatter(structure: &MeanStructure<'_>, recorded: &[Dataset], without_ids: &[String]) -> Vec<Finding> {
     let mut findings = Vec::new();
     let outliers = structure.checked.outliers;
