@@ -119,18 +119,8 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     terminal.say(&format!("2. Calibration and diagnosis: {}.", diagnosis.document.sentence))?;
     tell(&diagnosis, terminal)?;
 
-    let mut new = sim_yair::simulate(&robot, seed, NEW)?.dataset;
-    new.provenance.name = Some("new".to_owned());
-    write_dataset(&new, &path("new-session"), arguments.force)?;
-    let [nominal, calibrated, extended] = drift_percents(&diagnosis, std::slice::from_ref(&new));
-    let drift = Drift { nominal, calibrated, extended };
-    let shown = |percent: Option<f64>| percent.map_or_else(|| "–".to_owned(), |percent| format!("{percent:.3} %"));
-    terminal.say(&format!(
-        "3. In a new session, dead reckoning drifts {} as configured, {} calibrated, {} with the fault corrected.",
-        shown(nominal),
-        shown(calibrated),
-        shown(extended)
-    ))?;
+    let new = driven(&robot, seed, NEW, "new", &path("new-session"), arguments.force)?;
+    let drift = drift(&diagnosis, new, terminal)?;
 
     let mut report = path("diagnosis").join("report.html");
     let planned = diagnosis.document.next_experiment.as_ref().map(|next| next.drive.clone());
@@ -138,12 +128,9 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         for (number, session) in (1_u64..).zip(&next.sessions) {
             let mut planned = Scenario { protocols: session.schedules.clone(), budget: None, ..robot.clone() };
             planned.robot.cruise_speed_m_s = session.speed_m_s;
-            let mut driven = sim_yair::simulate(&planned, seed, PLANNED + number - 1)?.dataset;
             let name = format!("planned-{number}");
-            driven.provenance.name = Some(name.clone());
-            write_dataset(&driven, &path(&name), arguments.force)?;
+            datasets.push(driven(&planned, seed, PLANNED + number - 1, &name, &path(&name), arguments.force)?);
             given.push(path(&name));
-            datasets.push(driven);
         }
         terminal.say(&format!("4. The robot drives what the diagnosis asks for: {}.", next.drive))?;
         match diagnosed(&datasets, &given, (&path("diagnosis-after-plan"), arguments.force), terminal) {
@@ -188,6 +175,27 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         report: report.display().to_string(),
     })?;
     Ok(if finding.is_some() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// A simulated session of some name, in a folder.
+fn driven(robot: &Scenario, seed: u64, trial: u64, name: &str, folder: &Path, force: bool) -> Result<Dataset, Failure> {
+    let mut dataset = sim_yair::simulate(robot, seed, trial)?.dataset;
+    dataset.provenance.name = Some(name.to_owned());
+    write_dataset(&dataset, folder, force)?;
+    Ok(dataset)
+}
+
+/// How far dead reckoning drifts in a session that was not fitted.
+fn drift(diagnosis: &Diagnosis, new: Dataset, terminal: &Terminal) -> Result<Drift, Failure> {
+    let [nominal, calibrated, extended] = drift_percents(diagnosis, &[new]);
+    let shown = |percent: Option<f64>| percent.map_or_else(|| "–".to_owned(), |percent| format!("{percent:.3} %"));
+    terminal.say(&format!(
+        "3. In a new session, dead reckoning drifts {} as configured, {} calibrated, {} with the fault corrected.",
+        shown(nominal),
+        shown(calibrated),
+        shown(extended)
+    ))?;
+    Ok(Drift { nominal, calibrated, extended })
 }
 
 /// Chooses the fault and its sizes.

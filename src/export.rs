@@ -9,7 +9,7 @@ use ::export::{CalibratedRobot, Lengths, Options, tum, tum_of_truth};
 use calib::{CalibrationReport, MethodReport, corrected_run};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
-use dataset::{Loaded, NominalRobot};
+use dataset::{Loaded, NominalRobot, TruthSample};
 use effects::OnBoard;
 use scenario::Scenario;
 use serde::Serialize;
@@ -397,14 +397,7 @@ fn export_dataset(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
                 tum(corrected.ok_or_else(|| format!("{place}: run \"{id}\": {why}"))?.poses)
             }
             None if !is_chosen(id) => continue,
-            None => {
-                let (text, without) = tum_of_truth(&run.run().truth);
-                if without > 0 {
-                    let what = format!("{without} positions without a heading: the file's headings are 0 there");
-                    terminal.remark(&format!("warning: {place}: run \"{id}\": {what}"));
-                }
-                text
-            }
+            None => trajectory_of_truth(&run.run().truth, &format!("{place}: run \"{id}\""), terminal),
         };
         if is_chosen(id) {
             texts.push((id.clone(), text));
@@ -415,16 +408,8 @@ fn export_dataset(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         return Err(format!("{place}: run \"{id}\" {why}").into());
     }
     let text = match (&arguments.out, &texts[..]) {
-        (Some(out), _) => {
-            // All names before the first file.
-            let files = texts.iter().map(|(id, _)| file_of(out, id, TUM, &place)).collect::<Result<Vec<_>, _>>()?;
-            let _new = NewFolders::to(out);
-            atomic_file::create_folder(out).map_err(|error| format!("{}: {}", out.display(), error.kind()))?;
-            atomic_file::remove_leftovers(out);
-            for (file, (_, text)) in files.iter().zip(&texts) {
-                atomic_file::write_whole(file, text.as_bytes())
-                    .map_err(|error| format!("{}: {}", file.display(), error.kind()))?;
-            }
+        (Some(out), texts) => {
+            write_trajectories(out, texts, &place)?;
             terminal.note(&format!("{} runs in {}", texts.len(), out.display()))?;
             None
         }
@@ -448,4 +433,28 @@ fn export_dataset(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         runs: texts.into_iter().map(|(id, _)| id).collect(),
     })?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// The truth of a run, whose place is named where a heading is not known.
+fn trajectory_of_truth(truth: &[TruthSample], place: &str, terminal: &Terminal) -> String {
+    let (text, without) = tum_of_truth(truth);
+    if without > 0 {
+        let what = format!("{without} positions without a heading: the file's headings are 0 there");
+        terminal.remark(&format!("warning: {place}: {what}"));
+    }
+    text
+}
+
+/// Writes the trajectories of runs, a file each.
+fn write_trajectories(out: &Path, texts: &[(String, String)], place: &str) -> Result<(), Failure> {
+    // All names before the first file.
+    let files = texts.iter().map(|(id, _)| file_of(out, id, TUM, place)).collect::<Result<Vec<_>, _>>()?;
+    let _new = NewFolders::to(out);
+    atomic_file::create_folder(out).map_err(|error| format!("{}: {}", out.display(), error.kind()))?;
+    atomic_file::remove_leftovers(out);
+    for (file, (_, text)) in files.iter().zip(texts) {
+        atomic_file::write_whole(file, text.as_bytes())
+            .map_err(|error| format!("{}: {}", file.display(), error.kind()))?;
+    }
+    Ok(())
 }

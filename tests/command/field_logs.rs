@@ -6,7 +6,7 @@ use std::path::Path;
 use serde_json::Value;
 
 use crate::support::real_data::real_data;
-use crate::support::{run_in, succeed};
+use crate::support::{Ended, run_in, succeed};
 
 const KEYS: [&str; 3] = ["left_wheel_diameter_m", "right_wheel_diameter_m", "wheel_separation_m"];
 
@@ -27,6 +27,13 @@ fn within(found: Option<[f64; 2]>, range_mm: [f64; 2]) {
     assert!(sigma < 0.05 * value, "{value} ± {sigma}");
     let [low, high] = [range_mm[0] - 2.0 * sigma, range_mm[1] + 2.0 * sigma];
     assert!((low..=high).contains(&value), "{value} ± {sigma} is not in {range_mm:?}");
+}
+
+/// Refused, with a message that has these words.
+#[track_caller]
+fn refused(ended: &Ended, words: &[&str]) {
+    let has_words = words.iter().all(|word| ended.stderr.contains(word));
+    assert!(ended.code == Some(1) && has_words, "{}", ended.stderr);
 }
 
 /// Imports the two tables of a robot as a dataset of the robot's name.
@@ -171,12 +178,7 @@ fn questions_that_people_asked_are_answered() {
     assert_eq!(ended.code, Some(0), "{}", ended.stderr);
     within(calibrated(folder, &["own"])[2], [430.0, 430.0]);
     let both = ["own_odometry_as_truth/odom.csv", "own_odometry_as_truth/mocap_with_twist.csv"];
-    let ended = import("both", &both, &ROBOT);
-    assert!(
-        ended.code == Some(1) && ended.stderr.contains("--wheels") && ended.stderr.contains("--truth"),
-        "{}",
-        ended.stderr
-    );
+    refused(&import("both", &both, &ROBOT), &["--wheels", "--truth"]);
 
     let seconds = ["sec_nanosec/wheels.csv", "sec_nanosec/truth.csv"];
     assert_eq!(import("seconds", &seconds, &ticks(&[])).code, Some(0));
@@ -184,12 +186,7 @@ fn questions_that_people_asked_are_answered() {
 
     let speeds = ["rad_s_read_as_rpm/wheels.csv", "rad_s_read_as_rpm/truth.csv"];
     let large = ["--wheel", ".3302", "--base", ".5708"];
-    let ended = import("speeds", &speeds, &large);
-    assert!(
-        ended.code == Some(1) && ended.stderr.contains("rpm") && ended.stderr.contains("rad/s"),
-        "{}",
-        ended.stderr
-    );
+    refused(&import("speeds", &speeds, &large), &["rpm", "rad/s"]);
     assert_eq!(
         import("speeds", &speeds, &[&large[..], &["--wheel-unit", "rad/s", "--length-unit", "m"]].concat()).code,
         Some(0)

@@ -72,6 +72,61 @@ const MIN_SHARE: f64 = 0.5;
 /// Robots and paths that are tried for an effect.
 const ATTEMPTS: u64 = 10;
 
+/// The least and the largest size over the detection limit.
+const fn size_ratios(case_kind: CaseKind) -> (f64, f64) {
+    match case_kind {
+        CaseKind::Pair | CaseKind::OneLog => NAMED_RATIOS,
+        CaseKind::Large => LARGE_RATIOS,
+        CaseKind::Null | CaseKind::Single | CaseKind::LeftOut => SINGLE_RATIOS,
+    }
+}
+
+/// What a case is made of.
+struct DrawnCase {
+    conditions: Conditions,
+    instrument_model: InstrumentModel,
+    robot: RandomRobot,
+    hidden: Vec<Hidden>,
+    /// What the scales are drawn with.
+    draw: Draw,
+}
+
+impl DrawnCase {
+    /// `None` where the robot cannot have what is to be hidden.
+    fn draw(
+        draws: CaseDraws,
+        case_kind: CaseKind,
+        instrument: Option<CaseInstrument>,
+        ids: &[&'static str],
+    ) -> Result<Option<Self>, ChallengeError> {
+        let needs = ids.iter().fold(Needs::default(), |all, id| all.and(Hidden::needs(id)));
+        if case_kind == CaseKind::OneLog && needs.payload {
+            return Ok(None); // a load is one for a run
+        }
+        let mut drawn = Conditions::draw(draws, needs, ids);
+        if case_kind == CaseKind::OneLog {
+            drawn.runs = 1;
+        }
+        let conditions = instrument.map_or(drawn, |instrument| instrument.conditions(drawn));
+        let instrument_model = match instrument {
+            Some(instrument) => instrument.model(&conditions),
+            None => InstrumentModel::draw(draws, &conditions),
+        };
+        let robot = RandomRobot::draw(draws, &conditions, instrument_model.rate_hz, needs)?;
+        let robot = match instrument {
+            Some(instrument) => instrument.robot(robot, draws),
+            None => robot,
+        };
+        let mut draw = draws.of("hidden");
+        let mut hidden = Vec::new();
+        for id in ids {
+            let Some(effect) = Hidden::draw(id, &robot, &mut draw) else { return Ok(None) };
+            hidden.push(effect);
+        }
+        Ok(Some(Self { conditions, instrument_model, robot, hidden, draw }))
+    }
+}
+
 impl Case {
     /// The case of a number; `None` where no robot that was tried shows the effect at all.
     pub(crate) fn draw(scope: Scope, seed: u64, number: u64) -> Result<Result<Self, &'static str>, ChallengeError> {
@@ -132,30 +187,11 @@ impl Case {
         ids: &[&'static str],
     ) -> Result<Attempt, ChallengeError> {
         let CaseDraws { seed, case: number, .. } = draws;
-        let needs = ids.iter().fold(Needs::default(), |all, id| all.and(Hidden::needs(id)));
-        if case_kind == CaseKind::OneLog && needs.payload {
-            return Ok(Attempt::Undetectable); // a load is one for a run
-        }
-        let mut drawn = Conditions::draw(draws, needs, ids);
-        if case_kind == CaseKind::OneLog {
-            drawn.runs = 1;
-        }
-        let conditions = instrument.map_or(drawn, |instrument| instrument.conditions(drawn));
-        let instrument_model = match instrument {
-            Some(instrument) => instrument.model(&conditions),
-            None => InstrumentModel::draw(draws, &conditions),
+        let Some(DrawnCase { conditions, instrument_model, robot, mut hidden, mut draw }) =
+            DrawnCase::draw(draws, case_kind, instrument, ids)?
+        else {
+            return Ok(Attempt::Undetectable);
         };
-        let robot = RandomRobot::draw(draws, &conditions, instrument_model.rate_hz, needs)?;
-        let robot = match instrument {
-            Some(instrument) => instrument.robot(robot, draws),
-            None => robot,
-        };
-        let mut draw = draws.of("hidden");
-        let mut hidden = Vec::new();
-        for id in ids {
-            let Some(effect) = Hidden::draw(id, &robot, &mut draw) else { return Ok(Attempt::Undetectable) };
-            hidden.push(effect);
-        }
         let measurement = DriveContext {
             seed,
             number,
@@ -165,11 +201,6 @@ impl Case {
             instrument,
         };
         let truth = robot.sessions[0].scenario.true_geometry().map_err(sim_yair::SimulationError::from)?;
-        let ratios = match case_kind {
-            CaseKind::Pair | CaseKind::OneLog => NAMED_RATIOS,
-            CaseKind::Large => LARGE_RATIOS,
-            CaseKind::Null | CaseKind::Single | CaseKind::LeftOut => SINGLE_RATIOS,
-        };
         let weak = hidden.iter().any(|hidden| hidden.kind != EffectKind::RecordFault);
         let plain =
             if weak { drive(&robot.sessions, &measurement, &[], Recorded::WithoutNoise, 0)? } else { Vec::new() };
@@ -178,80 +209,41 @@ impl Case {
         // An effect of one log is as large as the cut one shows it, where every run starts anew.
         let plain = cut_into_runs(plain, &stops);
         let noise = TrueNoise::of(&conditions, &instrument_model, mean_square_motion(&plain));
+        let case_oracle = CaseOracle { context: &measurement, plain: &plain, stops: &stops, truth, noise };
         let (mut detectability, mut rounding_shares) = (Vec::new(), Vec::new());
         for effect in &mut hidden {
-            // What was driven last, and at which scale: it is asked several things.
-            let mut last: Option<(f64, Vec<Dataset>)> = None;
-            let mut measured = |effect: &Hidden, noise: TrueNoise, hypotheses: Hypotheses<'_>| {
-                let driven = match last.take().filter(|(scale, _)| *scale == effect.scale) {
-                    Some((_, driven)) => driven,
-                    None => cut_into_runs(
-                        drive(&robot.sessions, &measurement, &[effect], Recorded::WithoutNoise, 0)?,
-                        &stops,
-                    ),
-                };
-                let found = Detectability::of(&driven, &plain, &truth, noise, hypotheses);
-                last = Some((effect.scale, driven));
-                Ok(found)
-            };
-            match scale(effect, &mut draw, ratios, |effect, hypotheses| measured(effect, noise, hypotheses))? {
-                Chosen::RecordFault => detectability.push(None),
-                Chosen::Detectability(found) => detectability.push(Some(*found)),
-                Chosen::Undetectable => {
-                    return Ok(match measured(effect, noise.without_rounding(), Hypotheses::One(effect.id)) {
-                        Ok(Some(unrounded)) if is_unresolved(effect, &unrounded, noise) => Attempt::Unresolved,
-                        _ => Attempt::Undetectable,
-                    });
+            match case_oracle.scaled(effect, &mut draw, size_ratios(case_kind))? {
+                Ok(found) => {
+                    detectability.push(found.detectability);
+                    rounding_shares.push(found.rounding_share);
                 }
+                Err(attempt) => return Ok(attempt),
             }
-            rounding_shares.push(match detectability.last() {
-                Some(Some(found)) if noise.has_rounding() => {
-                    measured(effect, noise.without_rounding(), Hypotheses::One(effect.id))?.map(|unrounded| {
-                        1.0 - known_noncentrality(effect, found) / known_noncentrality(effect, &unrounded)
-                    })
-                }
-                _ => None,
-            });
         }
         let all: Vec<&Hidden> = hidden.iter().collect();
         let both = if hidden.len() == 2 {
-            let exact = drive(&robot.sessions, &measurement, &all, Recorded::WithoutNoise, 0)?;
-            Detectability::of(&exact, &plain, &truth, noise, Hypotheses::All)
+            Detectability::of(&case_oracle.driven(&all)?, &plain, &truth, noise, Hypotheses::All)
         } else {
             None
         };
-        let oracle = hidden
-            .iter()
-            .enumerate()
-            .map(|(k, effect)| {
-                let mut view = view(effect, k, &detectability, both.as_ref(), &hidden);
-                view.rounding_share = rounding_shares[k].filter(|_| effect.kind == EffectKind::Mean);
-                if effect.kind == EffectKind::RecordFault {
-                    let driven = drive(&robot.sessions, &measurement, &[effect], Recorded::WithoutNoise, 0)?;
-                    view.aliases = fault_aliases(effect.id, &driven, &truth, noise);
-                }
-                Ok(view)
-            })
-            .collect::<Result<_, ChallengeError>>()?;
+        let mut oracle = Vec::new();
+        for (k, effect) in hidden.iter().enumerate() {
+            let mut view = view(effect, k, &detectability, both.as_ref(), &hidden);
+            view.rounding_share = rounding_shares[k].filter(|_| effect.kind == EffectKind::Mean);
+            if effect.kind == EffectKind::RecordFault {
+                view.aliases = fault_aliases(effect.id, &case_oracle.driven(&[effect])?, &truth, noise);
+            }
+            oracle.push(view);
+        }
         let best = both.as_ref().or(detectability.first().and_then(Option::as_ref));
         let best_drive = best.map(Detectability::best_drive);
         let datasets = drive(&robot.sessions, &measurement, &all, Recorded::AsLogged, 0)?;
-        let log = |hidden: &[&Hidden]| -> Result<Option<Dataset>, ChallengeError> {
-            Ok(drive(
-                std::slice::from_ref(&robot.held_out),
-                &measurement,
-                hidden,
-                Recorded::WithoutNoise,
-                HELD_OUT_RUN,
-            )?
-            .pop())
-        };
-        let held_out = if weak { log(&all)?.zip(log(&[])?) } else { None };
+        let held_out = if weak { case_oracle.held_out(&all)?.zip(case_oracle.held_out(&[])?) } else { None };
         let mut held_out_random = Vec::new();
         for (index, effect) in
             hidden.iter().enumerate().filter(|(_, effect)| !effect.other_form && has_random_signature(effect))
         {
-            held_out_random.extend(log(&[effect])?.map(|log| (index, log)));
+            held_out_random.extend(case_oracle.held_out(&[effect])?.map(|log| (index, log)));
         }
         Ok(Attempt::Ready(Box::new(Self {
             seed,
@@ -347,6 +339,77 @@ enum Chosen {
     RecordFault,
     Detectability(Box<Detectability>),
     Undetectable,
+}
+
+/// What the oracle knows of an effect at the scale that was chosen.
+struct ScaledEffect {
+    /// `None` for record faults.
+    detectability: Option<Detectability>,
+    /// `None` where rounding does not matter.
+    rounding_share: Option<f64>,
+}
+
+/// Drives of a case without noise.
+struct CaseOracle<'c> {
+    context: &'c DriveContext<'c>,
+    /// The sessions without effects.
+    plain: &'c [Dataset],
+    stops: &'c [Stops],
+    truth: DriveGeometry,
+    noise: TrueNoise,
+}
+
+impl CaseOracle<'_> {
+    /// The sessions with some effects.
+    fn driven(&self, hidden: &[&Hidden]) -> Result<Vec<Dataset>, ChallengeError> {
+        drive(&self.context.robot.sessions, self.context, hidden, Recorded::WithoutNoise, 0)
+    }
+
+    /// The held-out log with some effects.
+    fn held_out(&self, hidden: &[&Hidden]) -> Result<Option<Dataset>, ChallengeError> {
+        let plan = std::slice::from_ref(&self.context.robot.held_out);
+        Ok(drive(plan, self.context, hidden, Recorded::WithoutNoise, HELD_OUT_RUN)?.pop())
+    }
+
+    /// Sets the scale of an effect, or says why its robot is none for it.
+    fn scaled(
+        &self,
+        effect: &mut Hidden,
+        draw: &mut Draw,
+        ratios: (f64, f64),
+    ) -> Result<Result<ScaledEffect, Attempt>, ChallengeError> {
+        let Self { plain, stops, truth, noise, .. } = self;
+        // What was driven last, and at which scale: it is asked several things.
+        let mut last: Option<(f64, Vec<Dataset>)> = None;
+        let mut measured = |effect: &Hidden, noise: TrueNoise, hypotheses: Hypotheses<'_>| {
+            let driven = match last.take().filter(|(scale, _)| *scale == effect.scale) {
+                Some((_, driven)) => driven,
+                None => cut_into_runs(self.driven(&[effect])?, stops),
+            };
+            let found = Detectability::of(&driven, plain, truth, noise, hypotheses);
+            last = Some((effect.scale, driven));
+            Ok(found)
+        };
+        let detectability =
+            match scale(effect, draw, ratios, |effect, hypotheses| measured(effect, *noise, hypotheses))? {
+                Chosen::RecordFault => None,
+                Chosen::Detectability(found) => Some(*found),
+                Chosen::Undetectable => {
+                    return Ok(Err(match measured(effect, noise.without_rounding(), Hypotheses::One(effect.id)) {
+                        Ok(Some(unrounded)) if is_unresolved(effect, &unrounded, *noise) => Attempt::Unresolved,
+                        _ => Attempt::Undetectable,
+                    }));
+                }
+            };
+        let rounding_share = match &detectability {
+            Some(found) if noise.has_rounding() => {
+                measured(effect, noise.without_rounding(), Hypotheses::One(effect.id))?
+                    .map(|unrounded| 1.0 - known_noncentrality(effect, found) / known_noncentrality(effect, &unrounded))
+            }
+            _ => None,
+        };
+        Ok(Ok(ScaledEffect { detectability, rounding_share }))
+    }
 }
 
 /// Sets a scale at which the effect is as large as drawn, in units of the oracle's detection limit.

@@ -183,16 +183,12 @@ pub(crate) fn read_name(name: &str) -> Option<NameReading> {
     }
     if has(TIME) && !has(&["x", "y", "z"]) {
         let of_header = has(&["header"]) && has(&["stamp"]);
-        return reading(
-            Quantity::Time,
-            if of_header {
-                4
-            } else if tokens.len() == 1 {
-                3
-            } else {
-                2
-            },
-        );
+        let rank = match tokens.len() {
+            _ if of_header => 4,
+            1 => 3,
+            _ => 2,
+        };
+        return reading(Quantity::Time, rank);
     }
     if let Some((quantity, words)) = side(&tokens) {
         let has = |known: &[&str]| words.iter().any(|word| known.contains(&word.as_str()));
@@ -202,26 +198,22 @@ pub(crate) fn read_name(name: &str) -> Option<NameReading> {
         let of_rate = ["rate", "speed", "velocity", "vel", "rpm"];
         let is_counted = unit == Some(Unit::Ticks) || (has(COUNTED) && !has(&of_rate));
         let is_rate = !is_counted && (unit.is_some_and(Unit::is_rate) || has(RATE));
-        let rank = if is_counted {
-            3
-        } else if is_rate {
-            1
-        } else {
-            2
+        let rank = match (is_counted, is_rate) {
+            (true, _) => 3,
+            (false, true) => 1,
+            (false, false) => 2,
         };
         let is_angle = !is_counted && !is_rate && has(&["position", "pos", "angle", "ang", "phi", "theta", "winkel"]);
         return Some(NameReading { unit, rank, is_rate, is_counted, is_angle, ..NameReading::of(quantity) });
     }
     let last = tokens.last().map_or("", String::as_str);
     let is_own = has(OWN);
-    let rank = if is_own {
-        0
-    } else if has(OUTSIDE) {
-        2
-    } else {
-        1
+    let is_outside = !is_own && has(OUTSIDE);
+    let rank = match (is_own, is_outside) {
+        (true, _) => 0,
+        (false, true) => 2,
+        (false, false) => 1,
     };
-    let is_outside = rank == 2;
     let pose = |quantity| Some(NameReading { unit, rank, is_own, is_outside, ..NameReading::of(quantity) });
     let moving = has(RATE) || has(&["linear", "angular", "lin"]);
     match (last, has(OF_ROTATION)) {

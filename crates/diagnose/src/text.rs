@@ -12,6 +12,7 @@ use crate::checks::errors_at_rest::ErrorsAtRest;
 use crate::document::{self, Gain, GainLevel, Subsample, UnlistedTerm, Value, Verdict};
 use crate::findings::alternatives::{Alternative, Status};
 use crate::findings::finding::Finding;
+use crate::findings::geometry_deviation::GeometryDeviation;
 use crate::records::unknown_motion::{Anomaly, AnomalyKind};
 use crate::settings::FINDINGS;
 
@@ -156,22 +157,7 @@ fn sentence(finding: &Finding) -> String {
 fn basis(finding: &Finding) -> String {
     match &finding.basis {
         Basis::Mean => listed(&finding.parameters),
-        Basis::Products(trials) => {
-            let Cause::Term(UnlistedTerm { channel, covariates, coefficient, sigma }) = finding.first() else {
-                return format!("not in the catalogue: the best of {trials} products tried");
-            };
-            let covariates = covariates.join(" · ");
-            // As much as what a wheel gains in this time: what is logged of it is older.
-            let is_late = channel == "wheels" && covariates == "wheel acceleration" && *coefficient > 0.0;
-            let known = if is_late {
-                format!("; so is a log whose speeds are filtered, or that is late, by {coefficient:.3} s")
-            } else {
-                String::new()
-            };
-            format!(
-                "not in the catalogue: {channel}, grows with {covariates} ({coefficient:.3e} ± {sigma:.1e}); the best of {trials} products tried{known}"
-            )
-        }
+        Basis::Products(trials) => best_product(finding.first(), *trials),
         Basis::FailedTests(failed) => {
             let of_dependence = failed.iter().any(Check::is_of_covariate);
             let failed = failed.iter().map(Check::name).collect::<Vec<_>>().join(", ");
@@ -202,22 +188,7 @@ fn basis(finding: &Finding) -> String {
             "calibrated wheels are {} times as large as the robot's description says: it, its counts or their units are another robot's",
             as_ratio(*factor)
         ),
-        Basis::Geometry(deviation) => {
-            let (what, stated) = match deviation.of {
-                GeometryRatio::Wheels => ("calibrated wheels are", "as large as the robot's description says"),
-                GeometryRatio::RightOverLeft => {
-                    ("the right wheel over the left one is", "what the robot's description says")
-                }
-                GeometryRatio::Separation => {
-                    ("the calibrated wheel separation is", "what the robot's description says")
-                }
-            };
-            let why = match deviation.is_of_skid_steering() {
-                true => "as of a robot that skids in turns, or the description is another robot's",
-                false => "the description is another robot's, or the fit is of something else",
-            };
-            format!("{what} {} times {stated}: {why}", as_ratio(deviation.ratio))
-        }
+        Basis::Geometry(deviation) => geometry_deviation(deviation),
         Basis::ClockOffset(offset_s) => {
             let whose = match finding.runs.as_deref() {
                 None => "all runs".to_owned(),
@@ -260,6 +231,38 @@ fn basis(finding: &Finding) -> String {
         ),
         Basis::TurnScatter(sigma) => format!("headings scatter with the turn, by {:.1} mrad/√rad", 1e3 * sigma),
     }
+}
+
+/// The product of covariates that explains most, of so many that were tried.
+fn best_product(cause: &Cause, trials: usize) -> String {
+    let Cause::Term(UnlistedTerm { channel, covariates, coefficient, sigma }) = cause else {
+        return format!("not in the catalogue: the best of {trials} products tried");
+    };
+    let covariates = covariates.join(" · ");
+    // As much as what a wheel gains in this time: what is logged of it is older.
+    let is_late = channel == "wheels" && covariates == "wheel acceleration" && *coefficient > 0.0;
+    let known = if is_late {
+        format!("; so is a log whose speeds are filtered, or that is late, by {coefficient:.3} s")
+    } else {
+        String::new()
+    };
+    format!(
+        "not in the catalogue: {channel}, grows with {covariates} ({coefficient:.3e} ± {sigma:.1e}); the best of {trials} products tried{known}"
+    )
+}
+
+/// How the calibrated geometry deviates from the described one.
+fn geometry_deviation(deviation: &GeometryDeviation) -> String {
+    let (what, stated) = match deviation.of {
+        GeometryRatio::Wheels => ("calibrated wheels are", "as large as the robot's description says"),
+        GeometryRatio::RightOverLeft => ("the right wheel over the left one is", "what the robot's description says"),
+        GeometryRatio::Separation => ("the calibrated wheel separation is", "what the robot's description says"),
+    };
+    let why = match deviation.is_of_skid_steering() {
+        true => "as of a robot that skids in turns, or the description is another robot's",
+        false => "the description is another robot's, or the fit is of something else",
+    };
+    format!("{what} {} times {stated}: {why}", as_ratio(deviation.ratio))
 }
 
 /// Where something does not belong, the largest events first.

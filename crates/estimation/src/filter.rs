@@ -7,16 +7,16 @@
 
 use kinematics::{Kernel, Pose, Twist, Wheels, sin_cos, wrap_to_pi};
 use model_term::ModelTerm;
-use nalgebra::{Matrix3, Vector3, Vector4};
+use nalgebra::{Matrix3, Vector3};
 
 use crate::covariances::{Covariance, Covariances};
 use crate::derivatives::Derivatives;
 use crate::filter_state::{FilterState, Step, Update};
-use crate::innovation::InnovationComponent;
+use crate::innovation::{Innovation, InnovationComponent};
 use crate::kinematic_samples::KinematicSample;
 use crate::layout::Layout;
 use crate::model::{Column, Instrument, Model};
-use crate::noise::{NOISES, Noise, NoiseComponent};
+use crate::noise::{NOISES, Noise};
 use crate::noise_score::{JointUpdate, NoiseScore, TimingScore};
 use crate::noise_shape::{CorrelatedErrors, Whitened};
 use crate::pass_options::{OutlierGate, PassOptions};
@@ -346,24 +346,14 @@ impl<'f, 'a> Filter<'f, 'a> {
         rounding.pass(&mut state, noise_score);
     }
 
-    /// Takes a measurement; false, and nothing changes, when it lies too far off.
+    /// The innovation of a measurement after so many intervals; the pose has a heading of this sine and cosine.
     #[inline(always)]
-    fn update(&mut self, number: usize, propagation: &PropagationInterval) -> bool {
-        let measured = self.segment.measurements[propagation.measurement];
-        let Some(interval) = self.segment.intervals[propagation.intervals.clone()].last().copied() else { return true };
-        let variance = self.variance_of(&measured);
-        let model = self.model;
-        let (sin, cos) = sin_cos(self.pose.theta_rad);
-        let (rounding, mut state) = self.rounded();
-        rounding.enter(&mut state, variance, interval.interpolated_rad2[1], (model, (sin, cos)));
-        let twist = self.propagator.twist(interval.rate_at_ends_rad_s[1]);
-        self.measurement(number + 1, (measured.t_s, twist), (sin, cos));
-        let sample = self.propagator.sample(self.pose, (self.number, propagation.measurement));
+    fn innovation(&self, measured: &MeasuredPose, after: usize, twist: Twist, (sin, cos): (f64, f64)) -> Innovation {
         let Instrument { body_from_sensor: Pose { x_m: lx, y_m: ly, theta_rad: ltheta }, latency_s: late } =
             self.instrument;
         let mounted = Vector3::new(cos * lx - sin * ly, sin * lx + cos * ly, 0.0);
         // A late measurement is off by how far the instrument moved meanwhile.
-        let twists = self.twists_before(propagation.intervals.end, measured.t_s, twist);
+        let twists = self.twists_before(after, measured.t_s, twist);
         let sensor_velocity = |Twist { v_m_s, omega_rad_s }: Twist| {
             Vector3::new(cos * v_m_s - omega_rad_s * mounted.y, sin * v_m_s + omega_rad_s * mounted.x, omega_rad_s)
         };
@@ -380,8 +370,25 @@ impl<'f, 'a> Filter<'f, 'a> {
             measured.y_m - self.pose.y_m - ahead.y,
             measured.theta_rad.map_or(0.0, |theta_rad| wrap_to_pi(theta_rad - self.pose.theta_rad - ltheta - ahead.z)),
         );
+        Innovation { error, by_heading: Vector3::new(-ahead.y, ahead.x, 1.0), by_latency }
+    }
+
+    /// Takes a measurement; false, and nothing changes, when it lies too far off.
+    #[inline(always)]
+    fn update(&mut self, number: usize, propagation: &PropagationInterval) -> bool {
+        let measured = self.segment.measurements[propagation.measurement];
+        let Some(interval) = self.segment.intervals[propagation.intervals.clone()].last().copied() else { return true };
+        let variance = self.variance_of(&measured);
+        let model = self.model;
+        let (sin, cos) = sin_cos(self.pose.theta_rad);
+        let (rounding, mut state) = self.rounded();
+        rounding.enter(&mut state, variance, interval.interpolated_rad2[1], (model, (sin, cos)));
+        let twist = self.propagator.twist(interval.rate_at_ends_rad_s[1]);
+        self.measurement(number + 1, (measured.t_s, twist), (sin, cos));
+        let sample = self.propagator.sample(self.pose, (self.number, propagation.measurement));
+        let Innovation { error, by_heading, by_latency } =
+            self.innovation(&measured, propagation.intervals.end, twist, (sin, cos));
         // Derivatives of a component of the measurement by the pose; rows: along, across, heading.
-        let by_heading = Vector3::new(-ahead.y, ahead.x, 1.0);
         let axes = [Vector3::new(cos, sin, 0.0), Vector3::new(-sin, cos, 0.0), Vector3::z()];
         let components = if measured.theta_rad.is_some() { 3 } else { 2 };
         let [xy, theta] = variance;
@@ -431,35 +438,16 @@ impl<'f, 'a> Filter<'f, 'a> {
         // The geometry, and a free heading in the last column, act through the pose alone.
         let mounted_by = [Vector3::new(cos, sin, 0.0), Vector3::new(-sin, cos, 0.0), Vector3::z(), -by_latency];
         for (component, update) in measured.iter().enumerate().take(components) {
-            let axis = axes[component];
-            let Update { row, gain, v, s } = *update;
             if self.pass_options.noise_score && correlated.is_none() {
-                self.score_noise(component, update, r[component]);
+                let (covariance_by, pose_by_noise) = (&mut self.covariance_by, &mut self.pose_by_noise);
+                self.noise_score.add_component(component, update, r[component], covariance_by, pose_by_noise);
             }
-            if self.layout.instruments {
-                for (direct, by) in self.direct[Column::SensorX.index()..].iter_mut().zip(&mounted_by) {
-                    *direct = axis.dot(by);
-                }
-            }
-            for (direct, measurement) in
-                self.direct[self.layout.first_term()..].iter_mut().zip(self.by_measurement.along(axis))
-            {
-                *direct = measurement;
-            }
-            for ((j, by), direct) in self.j[component].iter_mut().zip(self.by.along(row)).zip(&self.direct) {
-                *j = -by - direct;
-            }
+            self.add_derivatives(component, update, axes[component], &mounted_by);
             if self.pass_options.innovations {
-                let sigma = s.sqrt();
-                self.innovations.push(InnovationComponent {
-                    segment: self.number,
-                    measurement: propagation.measurement,
-                    component,
-                    z: v / sigma,
-                    sigma,
-                });
+                let (segment, measurement, sigma) = (self.number, propagation.measurement, update.s.sqrt());
+                let z = update.v / sigma;
+                self.innovations.push(InnovationComponent { segment, measurement, component, z, sigma });
             }
-            self.by.add(gain, &self.j[component]);
         }
         let ([along, across, heading], [a, b, c]) = (&self.j, &measured);
         if components == 3 {
@@ -472,30 +460,29 @@ impl<'f, 'a> Filter<'f, 'a> {
         true
     }
 
-    /// The filter's recursions, differentiated by the logarithm of each variance; Gupta & Mehra 1974. With
-    /// the gain k = Ph/s, and ′ for a derivative, P′ ← P′ − P′h kᵀ − k (P′h)ᵀ + s′ k kᵀ.
+    /// Derivatives of one component by all columns, and what they add to those of the pose. `mounted_by` are
+    /// those of the measurement by the instrument's columns.
     #[inline(always)]
-    fn score_noise(&mut self, component: usize, update: &Update, r: f64) {
-        let Update { row, gain, v, s } = update;
-        let per_s = 1.0 / s;
-        let ph_by = self.covariance_by.along(row);
-        let [x, y, theta] = &mut self.pose_by_noise;
-        let (mut s_by, mut v_by) = ([0.0; NOISES], [0.0; NOISES]);
-        for a in 0..NOISES {
-            s_by[a] = row.x * ph_by[0][a] + row.y * ph_by[1][a] + row.z * ph_by[2][a];
-            v_by[a] = -(row.x * x[a] + row.y * y[a] + row.z * theta[a]);
+    fn add_derivatives(
+        &mut self,
+        component: usize,
+        Update { row, gain, .. }: &Update,
+        axis: Vector3<f64>,
+        mounted_by: &[Vector3<f64>; 4],
+    ) {
+        if self.layout.instruments {
+            for (direct, by) in self.direct[Column::SensorX.index()..].iter_mut().zip(mounted_by) {
+                *direct = axis.dot(by);
+            }
         }
-        s_by[if component < 2 { NoiseComponent::MeasurementPosition } else { NoiseComponent::MeasurementHeading }
-            as usize] += r;
-        for a in 0..NOISES {
-            let of_v = v * per_s;
-            x[a] += (ph_by[0][a] - gain.x * s_by[a]) * of_v + gain.x * v_by[a];
-            y[a] += (ph_by[1][a] - gain.y * s_by[a]) * of_v + gain.y * v_by[a];
-            theta[a] += (ph_by[2][a] - gain.z * s_by[a]) * of_v + gain.z * v_by[a];
+        for (direct, measurement) in
+            self.direct[self.layout.first_term()..].iter_mut().zip(self.by_measurement.along(axis))
+        {
+            *direct = measurement;
         }
-        self.covariance_by.lower_with_gain(gain, &ph_by, &s_by);
-        let (s_by, v_by) = (Vector4::from(s_by) * per_s, Vector4::from(v_by));
-        self.noise_score.gradient += s_by * (0.5 * (1.0 - v * v * per_s)) + v_by * (v * per_s);
-        self.noise_score.information += s_by * s_by.transpose() * 0.5 + v_by * v_by.transpose() * per_s;
+        for ((j, by), direct) in self.j[component].iter_mut().zip(self.by.along(*row)).zip(&self.direct) {
+            *j = -by - direct;
+        }
+        self.by.add(*gain, &self.j[component]);
     }
 }

@@ -1,12 +1,13 @@
 //! The score of the variances: what each measurement says of them.
 //!
-//! Measurements with independent components add theirs in [`crate::filter`], one after the other. Where
+//! Measurements with independent components add theirs one after the other. Where
 //! errors of position and heading correlate, the components depend on the variances themselves; the whole
 //! measurement is taken at once, as the covariance of its errors alone depends on them.
 
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
 use crate::covariances::Covariances;
+use crate::filter_state::Update;
 use crate::noise::{NOISES, NoiseComponent};
 use crate::noise_shape::CorrelatedErrors;
 
@@ -70,6 +71,41 @@ impl NoiseScore {
     pub(crate) fn add(&mut self, other: &Self, weight: f64) {
         self.gradient += weight * other.gradient;
         self.information += weight * other.information;
+    }
+
+    /// Adds what one component of a measurement says, of variance r, and takes the derivatives of covariance
+    /// and pose over it. With the gain k = Ph/s, and ′ for a derivative by the logarithm of a variance,
+    /// P′ ← P′ − P′h kᵀ − k (P′h)ᵀ + s′ k kᵀ; Gupta & Mehra 1974.
+    #[inline(always)]
+    pub(crate) fn add_component(
+        &mut self,
+        component: usize,
+        update: &Update,
+        r: f64,
+        covariance_by: &mut Covariances<NOISES>,
+        pose_by_noise: &mut [[f64; NOISES]; 3],
+    ) {
+        let Update { row, gain, v, s } = update;
+        let per_s = 1.0 / s;
+        let ph_by = covariance_by.along(row);
+        let [x, y, theta] = pose_by_noise;
+        let (mut s_by, mut v_by) = ([0.0; NOISES], [0.0; NOISES]);
+        for a in 0..NOISES {
+            s_by[a] = row.x * ph_by[0][a] + row.y * ph_by[1][a] + row.z * ph_by[2][a];
+            v_by[a] = -(row.x * x[a] + row.y * y[a] + row.z * theta[a]);
+        }
+        s_by[if component < 2 { NoiseComponent::MeasurementPosition } else { NoiseComponent::MeasurementHeading }
+            as usize] += r;
+        for a in 0..NOISES {
+            let of_v = v * per_s;
+            x[a] += (ph_by[0][a] - gain.x * s_by[a]) * of_v + gain.x * v_by[a];
+            y[a] += (ph_by[1][a] - gain.y * s_by[a]) * of_v + gain.y * v_by[a];
+            theta[a] += (ph_by[2][a] - gain.z * s_by[a]) * of_v + gain.z * v_by[a];
+        }
+        covariance_by.lower_with_gain(gain, &ph_by, &s_by);
+        let (s_by, v_by) = (Vector4::from(s_by) * per_s, Vector4::from(v_by));
+        self.gradient += s_by * (0.5 * (1.0 - v * v * per_s)) + v_by * (v * per_s);
+        self.information += s_by * s_by.transpose() * 0.5 + v_by * v_by.transpose() * per_s;
     }
 
     /// Adds what a whole measurement says, and takes the derivatives of covariance and pose over it. With

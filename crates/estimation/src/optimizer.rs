@@ -1,7 +1,6 @@
 //! The fit: Gauss–Newton for the mean parameters and Fisher scoring for the noise, side by side.
 
 use dataset::median;
-use kinematics::{Pose, unwrap_near};
 use model_term::ModelTerm;
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 
@@ -20,7 +19,7 @@ use crate::settings::{
     ABSOLUTE_DAMPING, CACHED_STEP, CHI_SQUARE_1_MEDIAN, CONFIRMING_STEP_TOLERANCE, GATING_STEP,
     HEADING_STEP_TOLERANCE_RAD, LEFT_BASIN_STEP, MAX_FIT_STEPS, MAX_GEOMETRY_STEP, MAX_NOISE_SCALING, MAX_NOISE_STEP,
     MAX_UNGATED_STEPS, MEAN_COST_TOLERANCE, MEAN_STEP_TOLERANCE, MIN_NOISE_SIGMA, MIN_UNGATED_STEPS,
-    NOISE_COST_TOLERANCE, NOISE_STEP_TOLERANCE, RELATIVE_DAMPING, REUSE_TOLERANCE, START_HEADING_BASELINE_M,
+    NOISE_COST_TOLERANCE, NOISE_STEP_TOLERANCE, RELATIVE_DAMPING, REUSE_TOLERANCE,
 };
 use crate::step_control::{Progress, StepDamping};
 use crate::thinning::Selection;
@@ -131,6 +130,64 @@ pub fn fit(
     fit_from(records, selections, from, &NoisePrior::of(stated), terms, options)
 }
 
+/// A fit as its steps go on.
+struct Fit<'f, 'r> {
+    records: &'f Records<'r>,
+    selections: &'f [Selection],
+    prior: &'f NoisePrior,
+    options: &'f FitOptions,
+    /// Directions along which the mean moves.
+    basis: DMatrix<f64>,
+    model: Model,
+    noise: Noise,
+    headings: Vec<f64>,
+}
+
+impl Fit<'_, '_> {
+    fn pass(&self, terms: &mut [Box<dyn ModelTerm>], pass_options: PassOptions<'_>) -> Pass {
+        pass(self.records, self.selections, &self.model, &self.noise, &self.headings, terms, pass_options)
+    }
+
+    fn noise_step(&self, found: &Pass) -> NoiseStep {
+        if self.options.noise_fixed {
+            return NoiseStep::none();
+        }
+        NoiseStep::of(&self.noise, found, self.prior, self.basis.ncols())
+    }
+
+    /// Steps among all measurements. The noise is scaled to the median, which is robust to outliers, before
+    /// these are rejected.
+    fn take_ungated_steps(&mut self, terms: &mut [Box<dyn ModelTerm>]) -> Result<(), EstimationError> {
+        let options = self.options;
+        for round in 1..=MAX_UNGATED_STEPS {
+            // Partial measurements give no innovations; their noise follows its likelihood.
+            let noise_score = self.records.is_partial() && !options.noise_fixed;
+            let (gate, free) = (OutlierGate::Off, Some(&options.columns[..]));
+            let pass_options = PassOptions { innovations: true, noise_score, gate, free, ..PassOptions::default() };
+            let found = self.pass(terms, pass_options);
+            let mean = MeanStep::of(&found, options, &self.basis)?;
+            let (_, own) = take_step(&mut self.model, &mut self.headings, &found, options, mean.by)?;
+            let moved = mean.squared + own;
+            if noise_score {
+                let step = self.noise_step(&found);
+                take_noise_step(&mut self.noise, step.by);
+            } else {
+                let squares = found.innovations.iter().flatten().map(|innovation| innovation.z.powi(2));
+                let Some(median) = median(squares) else { break };
+                self.noise = self.noise.scaled(
+                    (median / CHI_SQUARE_1_MEDIAN).clamp(MAX_NOISE_SCALING.recip(), MAX_NOISE_SCALING),
+                    MIN_NOISE_SIGMA * MIN_NOISE_SIGMA,
+                );
+            }
+            // Where steps are large, a long path with few measurements makes all of them look like outliers.
+            if round >= MIN_UNGATED_STEPS && moved < GATING_STEP {
+                break;
+            }
+        }
+        Ok(())
+    }
+}
+
 pub(crate) fn fit_from(
     records: &Records<'_>,
     selections: &[Selection],
@@ -142,39 +199,13 @@ pub(crate) fn fit_from(
     if selections.iter().all(Selection::is_empty) {
         return Err(EstimationError::NoMeasurements);
     }
-    let mut model = from.model;
-    let mut headings = from
-        .free_headings
-        .unwrap_or_else(|| records.segments.iter().map(|segment| start_heading(segment, &model, 0)).collect());
+    let model = from.model;
+    let headings = from.free_headings.unwrap_or_else(|| records.start_headings_rad(&model));
     let basis = free_basis(options.columns.len(), &options.fixed);
-    let mut noise = from.noise.unwrap_or_else(|| prior.noise());
+    let noise = from.noise.unwrap_or_else(|| prior.noise());
+    let mut fit = Fit { records, selections, prior, options, basis, model, noise, headings };
     if from.noise.is_none() {
-        // The noise is scaled to the median, which is robust to outliers, before these are rejected.
-        for round in 1..=MAX_UNGATED_STEPS {
-            // Partial measurements give no innovations; their noise follows its likelihood.
-            let noise_score = records.is_partial() && !options.noise_fixed;
-            let (gate, free) = (OutlierGate::Off, Some(&options.columns[..]));
-            let pass_options = PassOptions { innovations: true, noise_score, gate, free, ..PassOptions::default() };
-            let found = pass(records, selections, &model, &noise, &headings, terms, pass_options);
-            let mean = MeanStep::of(&found, options, &basis)?;
-            let (_, own) = take_step(&mut model, &mut headings, &found, options, mean.by)?;
-            let moved = mean.squared + own;
-            if noise_score {
-                let step = NoiseStep::of(&noise, &found, prior, basis.ncols());
-                take_noise_step(&mut noise, step.by);
-            } else {
-                let squares = found.innovations.iter().flatten().map(|innovation| innovation.z.powi(2));
-                let Some(median) = median(squares) else { break };
-                noise = noise.scaled(
-                    (median / CHI_SQUARE_1_MEDIAN).clamp(MAX_NOISE_SCALING.recip(), MAX_NOISE_SCALING),
-                    MIN_NOISE_SIGMA * MIN_NOISE_SIGMA,
-                );
-            }
-            // Where steps are large, a long path with few measurements makes all of them look like outliers.
-            if round >= MIN_UNGATED_STEPS && moved < GATING_STEP {
-                break;
-            }
-        }
+        fit.take_ungated_steps(terms)?;
     }
     let pass_options = PassOptions {
         noise_score: !options.noise_fixed,
@@ -194,10 +225,9 @@ pub(crate) fn fit_from(
     for step in 0..options.max_steps {
         damping.only_shorter = 2 * step >= options.max_steps;
         let by_cached = PassOptions { keep: keep && cached.is_none(), by: cached.as_ref(), ..pass_options };
-        let mut found = pass(records, selections, &model, &noise, &headings, terms, by_cached);
-        let mean = MeanStep::of(&found, options, &basis)?;
-        let of_noise =
-            if options.noise_fixed { NoiseStep::none() } else { NoiseStep::of(&noise, &found, prior, basis.ncols()) };
+        let mut found = fit.pass(terms, by_cached);
+        let mean = MeanStep::of(&found, options, &fit.basis)?;
+        let of_noise = fit.noise_step(&found);
         let columns = options.columns.len();
         let damped = damping.damped(of_noise.by);
         let noise_step = if damping.only_shorter { damped.amax() } else { of_noise.by.amax() };
@@ -207,12 +237,13 @@ pub(crate) fn fit_from(
             let proposed = stacked(&mean.by, &of_noise.by);
             let by = acceleration.mixed(&proposed, &block_diagonal(&mean.information, &of_noise.information));
             let by_noise = Vector4::from_fn(|k, _| by[columns + k]);
-            let (moved, own) = take_step(&mut model, &mut headings, &found, options, by.rows(0, columns).into_owned())?;
-            acceleration.moved(proposed, stacked(&moved, &take_noise_step(&mut noise, by_noise)));
+            let (moved, own) =
+                take_step(&mut fit.model, &mut fit.headings, &found, options, by.rows(0, columns).into_owned())?;
+            acceleration.moved(proposed, stacked(&moved, &take_noise_step(&mut fit.noise, by_noise)));
             own
         } else {
-            take_noise_step(&mut noise, damped);
-            take_step(&mut model, &mut headings, &found, options, mean.by)?.1
+            take_noise_step(&mut fit.noise, damped);
+            take_step(&mut fit.model, &mut fit.headings, &found, options, mean.by)?.1
         };
         let moved = mean.squared + own;
         left_basin |= moved > LEFT_BASIN_STEP.max(*first.get_or_insert(moved));
@@ -243,7 +274,8 @@ pub(crate) fn fit_from(
         by,
         ..PassOptions::default()
     };
-    let pass = pass(records, selections, &model, &noise, &headings, terms, pass_options);
+    let pass = fit.pass(terms, pass_options);
+    let Fit { model, noise, headings, .. } = fit;
     Ok(Solution { model, noise, free_headings: headings, pass, converged: converged || is_near, left_basin })
 }
 
@@ -256,7 +288,7 @@ pub(crate) fn pass_settled(
     noise: &Noise,
 ) -> Result<(Model, Pass), EstimationError> {
     let options = FitOptions::of(&[]);
-    let headings: Vec<f64> = records.segments.iter().map(|segment| start_heading(segment, &model, 0)).collect();
+    let headings = records.start_headings_rad(&model);
     let settled = |(mut model, mut headings): (Model, Vec<f64>), gate| {
         let pass_options = PassOptions { gate, ..PassOptions::default() };
         for round in 1.. {
@@ -446,34 +478,6 @@ fn block_diagonal(mean: &DMatrix<f64>, noise: &Matrix4<f64>) -> DMatrix<f64> {
     all.view_mut((0, 0), (n, n)).copy_from(mean);
     all.view_mut((n, n), noise.shape()).copy_from(noise);
     all
-}
-
-/// Approximate heading of the instrument at one of the measurements of a segment without measured headings,
-/// radians: the rotation of its dead-reckoned path from there onto the measured one. 0 for other segments.
-pub(crate) fn start_heading(segment: &Segment<'_>, model: &Model, from: usize) -> f64 {
-    let Some(first) = segment.measurements.get(from).filter(|_| segment.has_free_heading()) else {
-        return 0.0;
-    };
-    let (mut pose, mut at) = (Pose::IDENTITY, first.after);
-    let body_from_sensor = model.instrument(segment.run).body_from_sensor;
-    let sensor_from_body = body_from_sensor.inverse();
-    let (mut dot, mut cross, mut longest_m) = (0.0, 0.0, 0.0_f64);
-    for measurement in &segment.measurements[from + 1..] {
-        for interval in &segment.intervals[at..measurement.after] {
-            pose = pose * model.increment(interval.wheel_rad).arc();
-        }
-        at = measurement.after;
-        let (x_m, y_m) = (measurement.x_m - first.x_m, measurement.y_m - first.y_m);
-        let moved = sensor_from_body * pose * body_from_sensor;
-        dot += moved.x_m * x_m + moved.y_m * y_m;
-        cross += moved.x_m * y_m - moved.y_m * x_m;
-        longest_m = longest_m.max(x_m.hypot(y_m));
-        // Dead reckoning is best near the start.
-        if longest_m > START_HEADING_BASELINE_M {
-            break;
-        }
-    }
-    if dot == 0.0 && cross == 0.0 { 0.0 } else { unwrap_near(cross.atan2(dot), 0.0) }
 }
 
 #[cfg(test)]

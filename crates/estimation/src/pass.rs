@@ -24,7 +24,7 @@ use crate::partial_poses::TakenPoses;
 use crate::partial_records::PartialSegment;
 use crate::pass_options::{OutlierGate, PassOptions};
 use crate::products::{HeadingResponse, Products};
-use crate::propagation::{CachedPropagation, CarriedState, PropagationSource, SegmentCache};
+use crate::propagation::{CachedPropagation, CarriedState, Change, PropagationSource, SegmentCache};
 use crate::records::Records;
 use crate::segment::{Segment, Start};
 use crate::settings::{MIN_PARALLEL_WORK, MIN_RESTRICTED_SHARE};
@@ -139,150 +139,49 @@ pub(crate) fn pass(
     let free = pass_options.free.filter(|_| model.own.is_none());
     let layout = Layout::of(&pass_options, parameters, model.own.is_some());
     let columns = layout.columns_of_equations();
-    let products = Products::of(layout, pass_options.parts, free);
+    let segment_filter = SegmentFilter {
+        records,
+        runs: runs(&records.segments),
+        model,
+        noise,
+        free_headings,
+        products: Products::of(layout, pass_options.parts, free),
+        reused: pass_options.by.map(|cached| (cached, cached.change_to(model))),
+        has_memory: !terms.is_empty() || pass_options.samples,
+        weight: 1.0 / selections.len() as f64,
+        pass_options,
+    };
+    let SegmentFilter { runs, weight, .. } = &segment_filter;
     let mut result = Pass::nothing();
-    let weight = 1.0 / selections.len() as f64;
-    let runs = runs(&records.segments);
     result.runs =
         runs.iter().map(|segments| NormalEquations::new(records.segments[segments.start].run, columns)).collect();
-    // Terms and samples remember what was driven before.
-    let has_memory = !terms.is_empty() || pass_options.samples;
-    let reused = pass_options.by.map(|cached| (cached, cached.change_to(model)));
-    let of_segment = |(phase, number): (usize, usize),
-                      propagations: &[PropagationInterval],
-                      terms: &mut [Box<dyn ModelTerm>],
-                      carried: &mut Option<CarriedState>| {
-        let segment = &records.segments[number];
-        let mut filter = Filter::new(segment, number, model, noise, &products, terms, pass_options);
-        if let Some(carried) = carried.take().filter(|_| segment.continues) {
-            filter.carry_on(carried);
-        }
-        if let Some((cached, change)) = &reused {
-            filter.take_propagations(cached.reused(phase, number, change));
-        } else if pass_options.keep {
-            filter.take_propagations(PropagationSource::cached(propagations.len(), parameters));
-        }
-        let free_heading_rad = free_headings[number];
-        // Loops over a dozen columns: eight at a time leave more over than they save.
-        InstructionSet::Avx2.run(FilterRun { filter: &mut filter, propagations, free_heading_rad });
-        *carried = Some(filter.carried());
-        let samples = std::mem::take(&mut filter.samples);
-        let timing = filter.timing;
-        let (sums, outliers, innovations, noise_score, cached) = filter.into_parts();
-        let (equations, heading) = sums.eliminated(segment.run);
-        let cached = cached.map(Arc::new);
-        (equations, OfSegment { number, heading, innovations, samples, outliers, noise_score, timing, cached })
-    };
     let mut phases = Vec::with_capacity(selections.len());
     let mut outliers = Vec::with_capacity(selections.len());
     let mut innovations_by_phase = Vec::new();
-    // Of each run in the phase before, where this phase takes the same of it.
-    let mut repeated: Vec<Option<Vec<OfSegment>>> = vec![None; runs.len()];
-    for (phase, selection) in selections.iter().enumerate() {
-        let propagations = &selection.propagations;
-        // How many phases from this one on take the same of a run: it is filtered once for them.
-        let times: Vec<usize> = runs.iter().map(|run| Selection::times_in_a_row(&selections[phase..], run)).collect();
-        let of_run = |number_of_run: usize, equations: &mut NormalEquations, terms: &mut [Box<dyn ModelTerm>]| {
-            let mut carried: Option<CarriedState> = None;
-            let segments = &runs[number_of_run];
-            let (mut found, mut own) = (Vec::with_capacity(segments.len()), Vec::new());
-            if repeated[number_of_run].is_some() {
-                return found;
-            }
-            for number in segments.clone() {
-                let unobservable = propagations[number].is_empty();
-                // The state of terms, and what samples hold, go on over displacements that are not taken.
-                let remember = has_memory && pass_options.by.is_none();
-                if unobservable && (!remember || records.segments[number].start == Start::MeasuredPose) {
-                    continue;
-                }
-                let (own_equations, of_segment) =
-                    of_segment((phase, number), &propagations[number], terms, &mut carried);
-                if !unobservable {
-                    // Those of many displacements are large: kept only where they are repeated.
-                    if times[number_of_run] == 1 {
-                        equations.add(&own_equations, weight);
-                    } else {
-                        own.push(own_equations);
-                    }
-                    found.push(of_segment);
-                }
-            }
-            for _ in 0..times[number_of_run] {
-                own.iter().for_each(|own| equations.add(own, weight));
-            }
-            found
-        };
-        // Sums are taken in the order of the segments whichever way they go.
-        let work = |propagation: &PropagationInterval| {
-            if pass_options.by.is_some() { 1 } else { propagation.intervals.len().max(1) }
-        };
-        let new = runs.iter().zip(&repeated).filter(|(_, repeated)| repeated.is_none());
-        let work_of = |run: &Range<usize>| propagations[run.clone()].iter().flatten().map(work).sum::<usize>();
-        let at_once = new.map(|(run, _)| work_of(run)).sum::<usize>() >= MIN_PARALLEL_WORK;
-        let mut found: Vec<Vec<OfSegment>> = if at_once && !has_memory {
-            let is_repeated = |segment: usize| repeated[runs.partition_point(|run| run.end <= segment)].is_some();
-            let of = |number: usize| {
-                (!propagations[number].is_empty() && !is_repeated(number))
-                    .then(|| of_segment((phase, number), &propagations[number], &mut [], &mut None))
-            };
-            let mut ready: Vec<_> = (0..propagations.len()).into_par_iter().map(of).collect();
-            let in_run = |((segments, equations), times): ((&Range<usize>, &mut NormalEquations), &usize)| {
-                let ready = ready[segments.clone()].iter_mut().filter_map(Option::take);
-                let (own, found): (Vec<_>, Vec<_>) = ready.unzip();
-                for _ in 0..*times {
-                    own.iter().for_each(|own| equations.add(own, weight));
-                }
-                found
-            };
-            runs.iter().zip(&mut result.runs).zip(&times).map(in_run).collect()
-        } else if at_once {
-            // Segments of a run follow each other, as terms have a state; each run starts anew.
-            let in_run = |terms: &mut Vec<Box<dyn ModelTerm>>, (number, equations): (usize, &mut NormalEquations)| {
-                of_run(number, equations, terms)
-            };
-            result.runs.par_iter_mut().enumerate().map_init(|| terms.to_vec(), in_run).collect()
-        } else {
-            result.runs.iter_mut().enumerate().map(|(number, equations)| of_run(number, equations, terms)).collect()
-        };
-        for ((found, repeated), times) in found.iter_mut().zip(&mut repeated).zip(times) {
+    let mut repeated: Vec<Option<Vec<FilteredSegment>>> = vec![None; runs.len()];
+    for (number, selection) in selections.iter().enumerate() {
+        let repetitions = runs.iter().map(|run| Selection::times_in_a_row(&selections[number..], run)).collect();
+        let phase = Phase { number, propagations: &selection.propagations, repetitions, repeated: &repeated };
+        let mut found = segment_filter.filter(&phase, &mut result.runs, terms);
+        let repetitions = phase.repetitions;
+        for ((found, repeated), times) in found.iter_mut().zip(&mut repeated).zip(repetitions) {
             if let Some(repeated) = repeated.take() {
                 *found = repeated;
             }
             *repeated = (times > 1).then(|| found.clone());
         }
-        let reused = found.iter().flatten().map(|of| of.innovations.len()).sum();
-        let mut innovations = Vec::with_capacity(reused);
-        let mut samples = Vec::new();
-        let mut cached = vec![None; if pass_options.keep { propagations.len() } else { 0 }];
-        let mut rejected = Vec::new();
-        for of in found.into_iter().flatten() {
-            if pass_options.keep {
-                cached[of.number] = of.cached;
-            }
-            innovations.extend(of.innovations);
-            samples.extend(of.samples);
-            rejected.extend(of.outliers.into_iter().map(|measurement| (of.number, measurement)));
-            if let (0, Some(response)) = (phase, of.heading) {
-                let run = records.segments[of.number].run;
-                result.headings.push(FreeHeading { segment: of.number, run, response });
-            }
-            result.noise.add(&of.noise_score, weight);
-            result.timing.add(&of.timing, weight);
-        }
+        let PhaseResult { innovations, outliers: rejected, cached } =
+            segment_filter.add_phase(&mut result, number, found);
         outliers.push(rejected);
         phases.push(cached);
         if pass_options.innovations {
             innovations_by_phase.push(innovations);
         }
-        if pass_options.samples {
-            result.samples.push(samples);
-        }
     }
     let with_partial = selections.iter().zip(&outliers).filter(|_| records.has_partial());
     for (phase, (selection, rejected)) in with_partial.enumerate() {
         let poses = TakenPoses::of(&records.segments, free_headings, &selection.propagations, rejected);
-        let part = (records, selection, weight);
+        let part = (records, selection, *weight);
         // Partial measurements have derivatives by all columns.
         let products = Products::of(Layout::whole(parameters), pass_options.parts, free);
         let found = add_partial(&mut result, part, (&poses, pass_options.gate), (model, noise), &products, terms);
@@ -297,6 +196,187 @@ pub(crate) fn pass(
         result.own = own.eliminate(&mut result.runs, model);
     }
     result
+}
+
+type Terms = [Box<dyn ModelTerm>];
+
+/// Filters segments: what all of them share.
+struct SegmentFilter<'p, 'r> {
+    records: &'p Records<'r>,
+    /// The segments of each run.
+    runs: Vec<Range<usize>>,
+    model: &'p Model,
+    noise: &'p Noise,
+    free_headings: &'p [f64],
+    products: Products,
+    /// Cached propagations, and how the model has changed since.
+    reused: Option<(&'p CachedPropagation, Change)>,
+    /// Terms and samples remember what was driven before.
+    has_memory: bool,
+    /// Of a phase.
+    weight: f64,
+    pass_options: PassOptions<'p>,
+}
+
+/// One phase of a pass.
+struct Phase<'s> {
+    number: usize,
+    propagations: &'s [Vec<PropagationInterval>],
+    /// How many phases from this one on take the same of each run: it is filtered once for them.
+    repetitions: Vec<usize>,
+    /// Of each run in the phase before, where this phase takes the same of it.
+    repeated: &'s [Option<Vec<FilteredSegment>>],
+}
+
+/// What a phase gives that is not summed over phases.
+struct PhaseResult {
+    innovations: Vec<InnovationComponent>,
+    /// Segment and measurement.
+    outliers: Vec<(usize, usize)>,
+    /// By segment, where propagations are kept.
+    cached: Vec<Option<Arc<SegmentCache>>>,
+}
+
+impl SegmentFilter<'_, '_> {
+    /// Filters the segments of a phase, each run's with its equations. Sums are taken in the order of the
+    /// segments whichever way they go. Runs that are repeated give nothing.
+    fn filter(
+        &self,
+        phase: &Phase<'_>,
+        equations: &mut [NormalEquations],
+        terms: &mut Terms,
+    ) -> Vec<Vec<FilteredSegment>> {
+        let Self { runs, weight, .. } = self;
+        let work = |propagation: &PropagationInterval| {
+            if self.pass_options.by.is_some() { 1 } else { propagation.intervals.len().max(1) }
+        };
+        let new = runs.iter().zip(phase.repeated).filter(|(_, repeated)| repeated.is_none());
+        let work_of = |run: &Range<usize>| phase.propagations[run.clone()].iter().flatten().map(work).sum::<usize>();
+        let at_once = new.map(|(run, _)| work_of(run)).sum::<usize>() >= MIN_PARALLEL_WORK;
+        if at_once && !self.has_memory {
+            let is_repeated = |segment: usize| phase.repeated[runs.partition_point(|run| run.end <= segment)].is_some();
+            let of = |number: usize| {
+                (!phase.propagations[number].is_empty() && !is_repeated(number))
+                    .then(|| self.filter_segment(phase, number, &mut [], &mut None))
+            };
+            let mut ready: Vec<_> = (0..phase.propagations.len()).into_par_iter().map(of).collect();
+            let in_run = |((segments, equations), times): ((&Range<usize>, &mut NormalEquations), &usize)| {
+                let ready = ready[segments.clone()].iter_mut().filter_map(Option::take);
+                let (summands, found): (Vec<_>, Vec<_>) = ready.unzip();
+                for _ in 0..*times {
+                    summands.iter().for_each(|summand| equations.add(summand, *weight));
+                }
+                found
+            };
+            runs.iter().zip(equations).zip(&phase.repetitions).map(in_run).collect()
+        } else if at_once {
+            // Segments of a run follow each other, as terms have a state; each run starts anew.
+            let in_run = |terms: &mut Vec<Box<dyn ModelTerm>>, (run, equations): (usize, &mut NormalEquations)| {
+                self.filter_run(phase, run, equations, terms)
+            };
+            equations.par_iter_mut().enumerate().map_init(|| terms.to_vec(), in_run).collect()
+        } else {
+            let in_run = |(run, equations)| self.filter_run(phase, run, equations, terms);
+            equations.iter_mut().enumerate().map(in_run).collect()
+        }
+    }
+
+    /// Filters the segments of a run, one after the other.
+    fn filter_run(
+        &self,
+        phase: &Phase<'_>,
+        run: usize,
+        equations: &mut NormalEquations,
+        terms: &mut Terms,
+    ) -> Vec<FilteredSegment> {
+        let mut carried: Option<CarriedState> = None;
+        let segments = &self.runs[run];
+        let (mut found, mut summands) = (Vec::with_capacity(segments.len()), Vec::new());
+        if phase.repeated[run].is_some() {
+            return found;
+        }
+        for number in segments.clone() {
+            let unobservable = phase.propagations[number].is_empty();
+            // The state of terms, and what samples hold, go on over displacements that are not taken.
+            let remember = self.has_memory && self.pass_options.by.is_none();
+            if unobservable && (!remember || self.records.segments[number].start == Start::MeasuredPose) {
+                continue;
+            }
+            let (summand, filtered) = self.filter_segment(phase, number, terms, &mut carried);
+            if !unobservable {
+                // Those of many displacements are large: kept only where they are repeated.
+                if phase.repetitions[run] == 1 {
+                    equations.add(&summand, self.weight);
+                } else {
+                    summands.push(summand);
+                }
+                found.push(filtered);
+            }
+        }
+        for _ in 0..phase.repetitions[run] {
+            summands.iter().for_each(|summand| equations.add(summand, self.weight));
+        }
+        found
+    }
+
+    /// Filters a segment: its normal equation, and what else it gives.
+    fn filter_segment(
+        &self,
+        phase: &Phase<'_>,
+        number: usize,
+        terms: &mut Terms,
+        carried: &mut Option<CarriedState>,
+    ) -> (NormalEquations, FilteredSegment) {
+        let segment = &self.records.segments[number];
+        let propagations = &phase.propagations[number];
+        let mut filter = Filter::new(segment, number, self.model, self.noise, &self.products, terms, self.pass_options);
+        if let Some(carried) = carried.take().filter(|_| segment.continues) {
+            filter.carry_on(carried);
+        }
+        if let Some((cached, change)) = &self.reused {
+            filter.take_propagations(cached.reused(phase.number, number, change));
+        } else if self.pass_options.keep {
+            filter.take_propagations(PropagationSource::cached(propagations.len(), self.products.layout().parameters));
+        }
+        let free_heading_rad = self.free_headings[number];
+        // Loops over a dozen columns: eight at a time leave more over than they save.
+        InstructionSet::Avx2.run(FilterRun { filter: &mut filter, propagations, free_heading_rad });
+        *carried = Some(filter.carried());
+        let samples = std::mem::take(&mut filter.samples);
+        let timing = filter.timing;
+        let (sums, outliers, innovations, noise_score, cached) = filter.into_parts();
+        let (equations, heading) = sums.eliminated(segment.run);
+        let cached = cached.map(Arc::new);
+        (equations, FilteredSegment { number, heading, innovations, samples, outliers, noise_score, timing, cached })
+    }
+
+    /// Adds what the segments of a phase give beside their equations.
+    fn add_phase(&self, result: &mut Pass, phase: usize, found: Vec<Vec<FilteredSegment>>) -> PhaseResult {
+        let Self { records, weight, pass_options: PassOptions { keep, samples: with_samples, .. }, .. } = self;
+        let reused = found.iter().flatten().map(|of| of.innovations.len()).sum();
+        let mut innovations = Vec::with_capacity(reused);
+        let mut samples = Vec::new();
+        let mut cached = vec![None; if *keep { records.segments.len() } else { 0 }];
+        let mut outliers = Vec::new();
+        for of in found.into_iter().flatten() {
+            if *keep {
+                cached[of.number] = of.cached;
+            }
+            innovations.extend(of.innovations);
+            samples.extend(of.samples);
+            outliers.extend(of.outliers.into_iter().map(|measurement| (of.number, measurement)));
+            if let (0, Some(response)) = (phase, of.heading) {
+                let run = records.segments[of.number].run;
+                result.headings.push(FreeHeading { segment: of.number, run, response });
+            }
+            result.noise.add(&of.noise_score, *weight);
+            result.timing.add(&of.timing, *weight);
+        }
+        if *with_samples {
+            result.samples.push(samples);
+        }
+        PhaseResult { innovations, outliers, cached }
+    }
 }
 
 /// Adds the partial measurements to the normal equations of their runs, and what is known of the gyroscope's
@@ -380,7 +460,7 @@ fn runs(segments: &[Segment<'_>]) -> Vec<Range<usize>> {
 
 /// What one segment gives in one phase, beside its normal equation.
 #[derive(Clone)]
-struct OfSegment {
+struct FilteredSegment {
     number: usize,
     heading: Option<HeadingResponse>,
     innovations: Vec<InnovationComponent>,

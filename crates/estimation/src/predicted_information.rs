@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::model::Model;
 use crate::model_fit::ModelFit;
 use crate::noise::Noise;
-use crate::optimizer::{ConvergenceCriterion, Solution, start_heading};
+use crate::optimizer::{ConvergenceCriterion, Solution};
 use crate::pass::Pass;
 use crate::settings::NOISE_STEP_TOLERANCE;
 use crate::thinning::Selection;
@@ -25,7 +25,7 @@ impl<'a> ModelFit<'a> {
             ConvergenceCriterion::NoiseShare(NOISE_STEP_TOLERANCE),
             false,
         );
-        let free_headings = fit.records.segments.iter().map(|segment| start_heading(segment, &model, 0)).collect();
+        let free_headings = fit.records.start_headings_rad(&model);
         let reused =
             Solution { model, noise, free_headings, pass: Pass::nothing(), converged: true, left_basin: false };
         Self { solution: reused, ..fit }

@@ -49,14 +49,7 @@ const TIME_UNIT_NAMES: [&str; 3] = ["milliseconds", "microseconds", "nanoseconds
 pub(crate) fn sentence(kind: &Kind, runs: Option<&[String]>) -> String {
     let place = place(runs);
     let what = match kind {
-        Kind::NothingMoves { wheels_turn_rad, truth_extent_m } => match truth_extent_m {
-            Some(extent_m) => format!(
-                "the wheels turn by {} turns but the instrument sees the robot within {:.0} mm; record both while the robot drives",
-                turns(*wheels_turn_rad),
-                1e3 * extent_m
-            ),
-            None => "nothing moves: the wheels do not turn; record while the robot drives".to_owned(),
-        },
+        Kind::NothingMoves { wheels_turn_rad, truth_extent_m } => nothing_moves(*wheels_turn_rad, *truth_extent_m),
         Kind::TruthUnrelated { unexplained } => format!(
             "the truth does not follow the wheels: {:.0} % of its motion is not explained by theirs, at any clock offset that was tried; check that both tables are of the same drives",
             100.0 * unexplained
@@ -64,87 +57,25 @@ pub(crate) fn sentence(kind: &Kind, runs: Option<&[String]>) -> String {
         Kind::TimeInMilliseconds { row } => format!(
             "t_s is in milliseconds: rows lie {row:.0} \"seconds\" apart; divide the times of all tables by 1000"
         ),
-        Kind::TruthTimeUnit { unit, of_truth } => {
-            let (table, other) = if *of_truth { ("truth.csv", "odometry.csv") } else { ("odometry.csv", "truth.csv") };
-            format!(
-                "t_s of {table} is in {}, that of {other} in seconds; divide the times of {table} by {}",
-                TIME_UNIT_NAMES[*unit], CHECKS.time_units[*unit]
-            )
-        }
-        Kind::ClockOffset { offset_s, sigma_s } => {
-            let late = if *offset_s > 0.0 { "late" } else { "early" };
-            format!(
-                "the truth is {:.3} s ± {sigma_s:.3} s {late} against the log: the clocks are apart; shift truth's times by {:+.3} s",
-                offset_s.abs(),
-                -offset_s
-            )
-        }
-        Kind::ClockRate { rate } => {
-            let fast = if *rate > 0.0 { "fast" } else { "slow" };
-            format!(
-                "truth's clock runs {:.2} % {fast} against the log's, and wheels come out as wrong; multiply truth's times by {:.5}",
-                100.0 * rate.abs(),
-                1.0 / (1.0 + rate)
-            )
-        }
+        Kind::TruthTimeUnit { unit, of_truth } => truth_time_unit(*unit, *of_truth),
+        Kind::ClockOffset { offset_s, sigma_s } => clock_offset(*offset_s, *sigma_s),
+        Kind::ClockRate { rate } => clock_rate(*rate),
         Kind::HeadingInDegrees => "theta_rad of truth.csv is in degrees; multiply it by π/180".to_owned(),
         Kind::HeadingClockwise => {
             "theta_rad of truth.csv counts clockwise; it is counter-clockwise positive: change its sign".to_owned()
         }
-        Kind::AxesMirrored { axis: MirroredAxis::Exchanged } => {
-            "x_m and y_m of truth.csv are exchanged: the path turns the other way than the headings; y is to the left of x".to_owned()
-        }
-        Kind::AxesMirrored { axis } => format!(
-            "{} of truth.csv has the wrong sign: the path turns the other way than the headings; y is to the left of x",
-            if *axis == MirroredAxis::X { "x_m" } else { "y_m" }
-        ),
-        Kind::WheelsExchanged { label } => match label {
-            Some(true) => {
-                "left and right wheel are exchanged in the log: the truth turns as the protocol says, the wheels the other way".to_owned()
-            }
-            Some(false) => {
-                "the truth is mirrored: the wheels turn as the protocol says, the truth the other way; change the sign of y_m and theta_rad".to_owned()
-            }
-            None => {
-                "left and right wheel are exchanged in the log, or the truth is mirrored: every turn goes the other way; exchange the wheels' columns, or change the sign of y_m and theta_rad".to_owned()
-            }
-        },
+        Kind::AxesMirrored { axis } => axes_mirrored(*axis),
+        Kind::WheelsExchanged { label } => wheels_exchanged(*label).to_owned(),
         Kind::WheelBackwards { sides } => match &sides[..] {
             [side] => format!("the {} wheel counts backwards; change the sign of its column", side.name()),
             _ => "both wheels count backwards; change the sign of both columns".to_owned(),
         },
-        Kind::LengthUnit { ratio, unit, of_truth } => {
-            let (what, how) = if *of_truth {
-                ("x_m and y_m of the truth are", *ratio)
-            } else {
-                ("the lengths under [robot] in dataset.toml are", 1.0 / ratio)
-            };
-            match unit {
-                Some(unit) => format!("{what} in {unit} instead of metres; divide them by {how:.4}"),
-                None => format!("{what} {} what the rest of the dataset says; check the unit", times(how)),
-            }
-        }
-        Kind::TicksPerTurn { ratio, stated, simple } => {
-            let value = ticks_per_rev(*stated, *ratio).map_or_else(String::new, |found| format!(": near {found:.0}"));
-            let cause = match (*simple, stated.is_some()) {
-                (true, true) => "ticks_per_rev is wrong by a simple factor, or a radius is stated for a diameter",
-                (true, false) => "a radius is stated for a diameter, or the other way round; or the wheels turn by a gear",
-                (false, true) => "check ticks_per_rev and the wheels' diameters",
-                (false, false) => "check the wheels' diameters",
-            };
-            format!("both wheels are {} as large as stated; {cause}{value}", times(*ratio))
-        }
+        Kind::LengthUnit { ratio, unit, of_truth } => length_unit(*ratio, *unit, *of_truth),
+        Kind::TicksPerTurn { ratio, stated, simple } => ticks_per_turn(*ratio, *stated, *simple),
         Kind::OtherRobot { parameter, ratio } => {
-            let times = times(*ratio);
-            format!("{parameter} is {times} what dataset.toml states; correct it, or check the log's columns")
+            format!("{parameter} is {} what dataset.toml states; correct it, or check the log's columns", times(*ratio))
         }
-        Kind::SeveralRobots { parameter, sessions, values_m } => format!(
-            "the sessions are of different robots: {parameter} is {:.2} mm in {} and {:.2} mm in {}; calibrate them apart",
-            1e3 * values_m[0],
-            sessions[0],
-            1e3 * values_m[1],
-            sessions[1]
-        ),
+        Kind::SeveralRobots { parameter, sessions, values_m } => several_robots(parameter, sessions, *values_m),
         Kind::TruthIsOdometry => {
             "the truth is computed from the wheels: it follows nominal dead reckoning closer than any instrument could; give what an outside instrument measured".to_owned()
         }
@@ -152,26 +83,13 @@ pub(crate) fn sentence(kind: &Kind, runs: Option<&[String]>) -> String {
             "the truth moves by the wheels between its corrections: in {:.0} % of its turning steps the turn is that of nominal dead reckoning to 5e-5 rad, as in poses of SLAM or AMCL that odometry carries on; the calibration leans towards the nominal values: give the poses at the corrections alone, or poses of scan matching without the wheels",
             100.0 * share
         ),
-        Kind::CounterSpike { side, t_s, count, rows } => {
-            let more = if *rows > 1 { format!(", as in {} more rows", rows - 1) } else { String::new() };
-            format!(
-                "the {} counter shows {count} at t = {} s and comes back in the next row{more}; delete such rows",
-                side.name(),
-                to_ms(*t_s)
-            )
-        }
+        Kind::CounterSpike { side, t_s, count, rows } => counter_spike(*side, *t_s, *count, *rows),
         Kind::CounterRestart { side, t_s } => format!(
             "the {} counter starts again from 0 at t = {} s; cut the run there into two runs",
             side.name(),
             to_ms(*t_s)
         ),
-        Kind::TruthOutlier { t_s, distance_m, rows } => {
-            let more = if *rows > 1 { format!(", and {} more rows likewise", rows - 1) } else { String::new() };
-            format!(
-                "the truth jumps by {distance_m:.3e} m at t = {} s and comes back{more}; delete such rows",
-                to_ms(*t_s)
-            )
-        }
+        Kind::TruthOutlier { t_s, distance_m, rows } => truth_outlier(*t_s, *distance_m, *rows),
         Kind::InstantRates => {
             "v_mps and omega_radps are of the instant; a row's rates are to be those of the interval that ends there; average each row with the one before".to_owned()
         }
@@ -203,6 +121,105 @@ pub(crate) fn sentence(kind: &Kind, runs: Option<&[String]>) -> String {
         ),
     };
     format!("{place}{what}")
+}
+
+fn nothing_moves(wheels_turn_rad: f64, truth_extent_m: Option<f64>) -> String {
+    match truth_extent_m {
+        Some(extent_m) => format!(
+            "the wheels turn by {} turns but the instrument sees the robot within {:.0} mm; record both while the robot drives",
+            turns(wheels_turn_rad),
+            1e3 * extent_m
+        ),
+        None => "nothing moves: the wheels do not turn; record while the robot drives".to_owned(),
+    }
+}
+
+fn truth_time_unit(unit: usize, of_truth: bool) -> String {
+    let (table, other) = if of_truth { ("truth.csv", "odometry.csv") } else { ("odometry.csv", "truth.csv") };
+    let (name, factor) = (TIME_UNIT_NAMES[unit], CHECKS.time_units[unit]);
+    format!("t_s of {table} is in {name}, that of {other} in seconds; divide the times of {table} by {factor}")
+}
+
+fn clock_offset(offset_s: f64, sigma_s: f64) -> String {
+    format!(
+        "the truth is {:.3} s ± {sigma_s:.3} s {} against the log: the clocks are apart; shift truth's times by {:+.3} s",
+        offset_s.abs(),
+        if offset_s > 0.0 { "late" } else { "early" },
+        -offset_s
+    )
+}
+
+fn clock_rate(rate: f64) -> String {
+    format!(
+        "truth's clock runs {:.2} % {} against the log's, and wheels come out as wrong; multiply truth's times by {:.5}",
+        100.0 * rate.abs(),
+        if rate > 0.0 { "fast" } else { "slow" },
+        1.0 / (1.0 + rate)
+    )
+}
+
+fn axes_mirrored(axis: MirroredAxis) -> String {
+    let what = match axis {
+        MirroredAxis::Exchanged => "x_m and y_m of truth.csv are exchanged",
+        MirroredAxis::X => "x_m of truth.csv has the wrong sign",
+        MirroredAxis::Y => "y_m of truth.csv has the wrong sign",
+    };
+    format!("{what}: the path turns the other way than the headings; y is to the left of x")
+}
+
+const fn wheels_exchanged(label: Option<bool>) -> &'static str {
+    match label {
+        Some(true) => {
+            "left and right wheel are exchanged in the log: the truth turns as the protocol says, the wheels the other way"
+        }
+        Some(false) => {
+            "the truth is mirrored: the wheels turn as the protocol says, the truth the other way; change the sign of y_m and theta_rad"
+        }
+        None => {
+            "left and right wheel are exchanged in the log, or the truth is mirrored: every turn goes the other way; exchange the wheels' columns, or change the sign of y_m and theta_rad"
+        }
+    }
+}
+
+fn length_unit(ratio: f64, unit: Option<&str>, of_truth: bool) -> String {
+    let (what, how) = if of_truth {
+        ("x_m and y_m of the truth are", ratio)
+    } else {
+        ("the lengths under [robot] in dataset.toml are", 1.0 / ratio)
+    };
+    match unit {
+        Some(unit) => format!("{what} in {unit} instead of metres; divide them by {how:.4}"),
+        None => format!("{what} {} what the rest of the dataset says; check the unit", times(how)),
+    }
+}
+
+fn ticks_per_turn(ratio: f64, stated: Option<f64>, simple: bool) -> String {
+    let value = ticks_per_rev(stated, ratio).map_or_else(String::new, |found| format!(": near {found:.0}"));
+    let cause = match (simple, stated.is_some()) {
+        (true, true) => "ticks_per_rev is wrong by a simple factor, or a radius is stated for a diameter",
+        (true, false) => "a radius is stated for a diameter, or the other way round; or the wheels turn by a gear",
+        (false, true) => "check ticks_per_rev and the wheels' diameters",
+        (false, false) => "check the wheels' diameters",
+    };
+    format!("both wheels are {} as large as stated; {cause}{value}", times(ratio))
+}
+
+fn several_robots(parameter: &str, [first, second]: &[String; 2], values_m: [f64; 2]) -> String {
+    let [first_mm, second_mm] = values_m.map(|value_m| 1e3 * value_m);
+    format!(
+        "the sessions are of different robots: {parameter} is {first_mm:.2} mm in {first} and {second_mm:.2} mm in {second}; calibrate them apart"
+    )
+}
+
+fn counter_spike(side: Side, t_s: f64, count: f64, rows: usize) -> String {
+    let more = if rows > 1 { format!(", as in {} more rows", rows - 1) } else { String::new() };
+    let (side, t_s) = (side.name(), to_ms(t_s));
+    format!("the {side} counter shows {count} at t = {t_s} s and comes back in the next row{more}; delete such rows")
+}
+
+fn truth_outlier(t_s: f64, distance_m: f64, rows: usize) -> String {
+    let more = if rows > 1 { format!(", and {} more rows likewise", rows - 1) } else { String::new() };
+    format!("the truth jumps by {distance_m:.3e} m at t = {} s and comes back{more}; delete such rows", to_ms(t_s))
 }
 
 /// Turns as people read them.

@@ -155,7 +155,7 @@ pub(crate) fn named_gyro<'a>(survey: &'a Survey, topic: &str) -> Result<&'a Topi
         return Ok(topic);
     }
     let why = format!("no type of a gyroscope; expected {}", gyro::IMU);
-    Err(RosBagError::Unusable { topic: topic.name.clone(), type_name: topic.type_name.clone(), why })
+    Err(topic.unusable(why))
 }
 
 /// What the robot is compared with: poses, scans that show walls, or both.
@@ -178,7 +178,7 @@ pub(crate) fn reference<'a>(
     let scan = named("--scan", named_scan)?;
     if let Some(topic) = scan.filter(|topic| topic.type_name != LASER_SCAN) {
         let why = format!("no type of scans; expected {LASER_SCAN}");
-        return Err(RosBagError::Unusable { topic: topic.name.clone(), type_name: topic.type_name.clone(), why });
+        return Err(topic.unusable(why));
     }
     if named_truth.is_some() || is_none {
         return Ok(Reference { truth: named_truth, scan });

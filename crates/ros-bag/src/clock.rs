@@ -24,6 +24,14 @@ impl Times {
         let received_ns = i64::try_from(received_ns).unwrap_or(i64::MAX);
         Self { stamp_ns: stamp_ns.filter(|stamp_ns| *stamp_ns != 0), received_ns }
     }
+
+    /// The time by a clock, nanoseconds; none of a message without a stamp.
+    pub(crate) fn by(self, clock: Clock) -> Option<i64> {
+        match clock {
+            Clock::Stamps => self.stamp_ns,
+            Clock::Receipt => Some(self.received_ns),
+        }
+    }
 }
 
 /// Which of the two times.
@@ -50,12 +58,8 @@ pub(crate) struct Ordered {
 
 /// Brings rows into the order of time. Time may step back where runs may be cut.
 pub(crate) fn ordered(topic: &str, times: &[Times], clock: Clock, may_restart: bool) -> Result<Ordered, RosBagError> {
-    let of = |times: &Times| match clock {
-        Clock::Stamps => times.stamp_ns,
-        Clock::Receipt => Some(times.received_ns),
-    };
     let with_time: Vec<(usize, i64)> =
-        times.iter().enumerate().filter_map(|(row, times)| Some((row, of(times)?))).collect();
+        times.iter().enumerate().filter_map(|(row, times)| Some((row, times.by(clock)?))).collect();
     let unstamped = times.len() - with_time.len();
     let mut recordings: Vec<Vec<(usize, i64)>> = Vec::new();
     let mut latest_ns = i64::MIN;

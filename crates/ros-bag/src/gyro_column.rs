@@ -2,8 +2,8 @@
 
 use crate::clock::{self, Clock, seconds};
 use crate::error::RosBagError;
-use crate::gyro::{self, GyroReading};
-use crate::rows::{GyroRows, RECEIPT_MARGIN_S, Rows};
+use crate::gyro;
+use crate::rows::{GyroRows, RECEIPT_MARGIN_S};
 
 /// All messages in the order of time.
 pub(crate) struct GyroColumn {
@@ -32,7 +32,7 @@ impl GyroColumn {
         let rows = &gyro.rows;
         rows.refuse_none("a rate")?;
         if clock == Clock::Stamps && clock::clock(&rows.times) == Clock::Receipt {
-            return Err(unusable(rows, "its messages have no header stamps, by which the wheels are timed".to_owned()));
+            return Err(rows.unusable("its messages have no header stamps, by which the wheels are timed".to_owned()));
         }
         let mut doubts = rows.warnings();
         let ordered = rows.in_order(clock, may_restart, &mut doubts)?;
@@ -43,7 +43,7 @@ impl GyroColumn {
         };
         let messages: Vec<Message> = ordered.into_iter().map(message).collect();
         if !messages.iter().any(|message| (span_ns.0..=span_ns.1).contains(&message.time_ns)) {
-            return Err(unusable(rows, "none of its messages is of the time of the wheels".to_owned()));
+            return Err(rows.unusable("none of its messages is of the time of the wheels".to_owned()));
         }
         doubts.extend(gyro::doubt_of_axis(&rows.values).map(|doubt| format!("topic {}: {doubt}", rows.topic)));
         warnings.extend(doubts);
@@ -78,8 +78,4 @@ impl GyroColumn {
             )
         })
     }
-}
-
-fn unusable(rows: &Rows<GyroReading>, why: String) -> RosBagError {
-    RosBagError::Unusable { topic: rows.topic.clone(), type_name: rows.type_name.clone(), why }
 }

@@ -90,7 +90,12 @@ impl<T> Rows<T> {
             return Err(RosBagError::Message { topic: self.topic.clone(), number, why });
         }
         let why = format!("{} of {} messages have {what}; two are needed at least", self.values.len(), self.messages);
-        Err(RosBagError::Unusable { topic: self.topic.clone(), type_name: self.type_name.clone(), why })
+        Err(self.unusable(why))
+    }
+
+    /// That the topic does not hold what it was to be used for.
+    pub(crate) fn unusable(&self, why: String) -> RosBagError {
+        RosBagError::Unusable { topic: self.topic.clone(), type_name: self.type_name.clone(), why }
     }
 
     /// Rows in the order of time, with what was left out said.
@@ -259,9 +264,7 @@ impl Visited {
     fn chain_poses(&mut self, others: Others<'_>, wheels: &[Times]) -> Result<(), RosBagError> {
         let chain = others.truth.and_then(|(_, reader)| reader.chain());
         let Some(((chain, moved), rows)) = chain.zip(self.moved.take()).zip(self.truth.as_mut()) else { return Ok(()) };
-        let (topic, type_name) = (rows.topic.clone(), rows.type_name.clone());
-        let (placed, note) =
-            chain.poses(&moved, wheels).map_err(|why| RosBagError::Unusable { topic, type_name, why })?;
+        let (placed, note) = chain.poses(&moved, wheels).map_err(|why| rows.unusable(why))?;
         for placed in &placed {
             rows.push(placed.times, TruthReading::of_chain(placed), true);
         }

@@ -25,6 +25,16 @@ pub(crate) struct RunSpan {
     pub(crate) received_ns: (i64, i64),
 }
 
+impl RunSpan {
+    /// Whether a message is of the run. Of recordings with the same times each message belongs to that in
+    /// which it was received.
+    pub(crate) fn contains(&self, time_ns: i64, received_ns: i64) -> bool {
+        (self.clock_ns.0..=self.clock_ns.1).contains(&time_ns)
+            && seconds(self.received_ns.0, received_ns) >= -RECEIPT_MARGIN_S
+            && seconds(self.received_ns.1, received_ns) <= RECEIPT_MARGIN_S
+    }
+}
+
 /// What was taken of the scans.
 pub(crate) struct TakenScans {
     pub(crate) type_name: String,
@@ -46,6 +56,23 @@ struct LeftOut {
     instantaneous: usize,
 }
 
+/// Where the scans are, and the clock of the wheels, by which they are timed.
+#[derive(Clone, Copy)]
+pub(crate) struct ScanSource<'a> {
+    pub(crate) bag: &'a Bag,
+    pub(crate) topic: &'a Topic,
+    pub(crate) clock: Clock,
+}
+
+/// The scans of each run, and the lidar that took them.
+struct ScansByRun {
+    runs: Vec<Vec<SeenScan>>,
+    frame: String,
+    mounted: Option<Mounted>,
+    count: usize,
+    left_out: LeftOut,
+}
+
 /// Adds the walls that a lidar sees to the runs of a dataset, whose spans are given.
 ///
 /// # Errors
@@ -53,15 +80,67 @@ struct LeftOut {
 pub(crate) fn add_walls(
     dataset: &mut Dataset,
     spans: &[RunSpan],
-    (bag, topic, clock): (&Bag, &Topic, Clock),
+    source: ScanSource<'_>,
     frames: &StaticFrames,
     warnings: &mut Vec<String>,
 ) -> Result<TakenScans, RosBagError> {
-    let unusable =
-        |why: String| RosBagError::Unusable { topic: topic.name.clone(), type_name: topic.type_name.clone(), why };
+    let topic = source.topic;
     let session = dataset.session();
     let paths: Vec<NominalPath> = session.runs.iter().map(|run| NominalPath::of(run, session.robot)).collect();
-    let mut seen: Vec<Vec<SeenScan>> = spans.iter().map(|_| Vec::new()).collect();
+    let ScansByRun { mut runs, frame, mounted, count, left_out } =
+        scans_by_run(source, spans, &paths, frames, warnings)?;
+    let (mut readings, mut walls, mut ambiguous, mut seldom) = (0, 0, 0, 0);
+    for ((run, scans), path) in dataset.runs.iter_mut().zip(&mut runs).zip(&paths) {
+        scans.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
+        let scans: Vec<_> = scans.drain(..).map(|scan| scan.walls).collect();
+        let found: FollowedWalls = wall_tracks::follow(&scans, path, mounted.map(|of| of.body_from_lidar));
+        readings += found.readings.len();
+        walls += found.walls;
+        ambiguous += found.ambiguous;
+        seldom += found.seldom;
+        run.walls = found.readings;
+        run.walls.dedup_by(|next, before| is_again(next, before));
+    }
+    let mut note = |count: usize, what: &str| {
+        if count > 0 {
+            warnings.push(format!("topic {}: {count} {what}", topic.name));
+        }
+    };
+    note(left_out.outside, &format!("of {count} scans are before the first or after the last message of the wheels"));
+    note(left_out.without_wall, &format!("of {count} scans show no straight wall and were left out"));
+    note(ambiguous, "lines may be of two walls and were left out");
+    note(seldom, "lines are of walls that were seen too seldom and were left out");
+    note(
+        left_out.instantaneous,
+        "scans have no time_increment: their beams count as measured at the stamp, which is wrong by the turn during a scan unless the driver corrects it",
+    );
+    if readings == 0 {
+        let why =
+            format!("no straight wall of a metre is followed over its {count} scans; spin 1 to 4 m in front of one");
+        return Err(topic.unusable(why));
+    }
+    dataset.truth_noise.lidar =
+        Some(LidarExtrinsics { yaw_rad: mounted.map(|mounted| mounted.body_from_lidar.theta_rad) });
+    let place = match mounted {
+        Some(Mounted { body_from_lidar: Pose { x_m, y_m, theta_rad }, .. }) => format!(
+            "{frame} at ({x_m:.3}, {y_m:.3}) m and {:.1}° on the robot by /tf_static, from where its place is estimated",
+            theta_rad.to_degrees()
+        ),
+        None => format!("{frame}, whose place on the robot is estimated"),
+    };
+    let what = format!("{walls} straight walls in {} runs seen from {place}", dataset.runs.len());
+    Ok(TakenScans { type_name: topic.type_name.clone(), what, readings })
+}
+
+/// The scans within the runs, whose spans and nominal paths are given.
+fn scans_by_run(
+    ScanSource { bag, topic, clock }: ScanSource<'_>,
+    spans: &[RunSpan],
+    paths: &[NominalPath],
+    frames: &StaticFrames,
+    warnings: &mut Vec<String>,
+) -> Result<ScansByRun, RosBagError> {
+    let mut runs: Vec<Vec<SeenScan>> = spans.iter().map(|_| Vec::new()).collect();
     let mut left_out = LeftOut::default();
     let mut frame: Option<(String, Option<Mounted>)> = None;
     let mut scans: Rows<()> = Rows::new(&topic.name, &topic.type_name);
@@ -90,11 +169,9 @@ pub(crate) fn add_walls(
         };
         let times = Times::of(&value, received_ns);
         scans.push(times, (), true);
-        let time_ns = match clock {
-            Clock::Stamps => times.stamp_ns,
-            Clock::Receipt => Some(times.received_ns),
-        };
-        let of_run = time_ns.and_then(|time_ns| Some((run_at(spans, time_ns, times.received_ns)?, time_ns)));
+        let of_run = times.by(clock).and_then(|time_ns| {
+            Some((spans.iter().position(|span| span.contains(time_ns, times.received_ns))?, time_ns))
+        });
         let Some((run, time_ns)) = of_run else {
             left_out.outside += 1;
             return Ok(());
@@ -108,72 +185,21 @@ pub(crate) fn add_walls(
         let walls = wall_line::walls(&points);
         left_out.without_wall += usize::from(walls.is_empty());
         let at_their_instants = walls.iter().filter_map(|wall| at_mean_time(wall, t_s, &paths[run], mounted.as_ref()));
-        seen[run].push(SeenScan { t_s, walls: at_their_instants.collect() });
+        runs[run].push(SeenScan { t_s, walls: at_their_instants.collect() });
         Ok(())
     })?;
     if let Some(why) = why_not {
-        return Err(unusable(why));
+        return Err(topic.unusable(why));
     }
     scans.refuse_none("a scan")?;
-    let Some((frame, mounted)) = frame else { return Err(unusable("no scan was read".to_owned())) };
+    let Some((frame, mounted)) = frame else { return Err(topic.unusable("no scan was read".to_owned())) };
     warnings.extend(scans.warnings());
-    let count = scans.len();
-    let (mut readings, mut walls, mut ambiguous, mut seldom) = (0, 0, 0, 0);
-    for ((run, scans), path) in dataset.runs.iter_mut().zip(&mut seen).zip(&paths) {
-        scans.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
-        let scans: Vec<_> = scans.drain(..).map(|scan| scan.walls).collect();
-        let found: FollowedWalls = wall_tracks::follow(&scans, path, mounted.map(|of| of.body_from_lidar));
-        readings += found.readings.len();
-        walls += found.walls;
-        ambiguous += found.ambiguous;
-        seldom += found.seldom;
-        run.walls = found.readings;
-        run.walls.dedup_by(|next, before| is_again(next, before));
-    }
-    let mut note = |count: usize, what: &str| {
-        if count > 0 {
-            warnings.push(format!("topic {}: {count} {what}", topic.name));
-        }
-    };
-    note(left_out.outside, &format!("of {count} scans are before the first or after the last message of the wheels"));
-    note(left_out.without_wall, &format!("of {count} scans show no straight wall and were left out"));
-    note(ambiguous, "lines may be of two walls and were left out");
-    note(seldom, "lines are of walls that were seen too seldom and were left out");
-    note(
-        left_out.instantaneous,
-        "scans have no time_increment: their beams count as measured at the stamp, which is wrong by the turn during a scan unless the driver corrects it",
-    );
-    if readings == 0 {
-        let why =
-            format!("no straight wall of a metre is followed over its {count} scans; spin 1 to 4 m in front of one");
-        return Err(unusable(why));
-    }
-    dataset.truth_noise.lidar =
-        Some(LidarExtrinsics { yaw_rad: mounted.map(|mounted| mounted.body_from_lidar.theta_rad) });
-    let place = match mounted {
-        Some(Mounted { body_from_lidar: Pose { x_m, y_m, theta_rad }, .. }) => format!(
-            "{frame} at ({x_m:.3}, {y_m:.3}) m and {:.1}° on the robot by /tf_static, from where its place is estimated",
-            theta_rad.to_degrees()
-        ),
-        None => format!("{frame}, whose place on the robot is estimated"),
-    };
-    let what = format!("{walls} straight walls in {} runs seen from {place}", dataset.runs.len());
-    Ok(TakenScans { type_name: topic.type_name.clone(), what, readings })
+    Ok(ScansByRun { runs, frame, mounted, count: scans.len(), left_out })
 }
 
 /// Is it of the same wall and instant?
 fn is_again(next: &WallReading, before: &WallReading) -> bool {
     next.t_s == before.t_s && next.wall == before.wall
-}
-
-/// The run of an instant. Of recordings with the same times each scan belongs to that in which it was
-/// received.
-fn run_at(spans: &[RunSpan], time_ns: i64, received_ns: i64) -> Option<usize> {
-    spans.iter().position(|span| {
-        (span.clock_ns.0..=span.clock_ns.1).contains(&time_ns)
-            && seconds(span.received_ns.0, received_ns) >= -RECEIPT_MARGIN_S
-            && seconds(span.received_ns.1, received_ns) <= RECEIPT_MARGIN_S
-    })
 }
 
 /// Where the lidar stands some time after a scan's stamp, seen from where it stood then.

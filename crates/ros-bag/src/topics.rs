@@ -39,6 +39,11 @@ impl Topic {
     pub(crate) fn span_s(&self) -> f64 {
         self.last_ns.saturating_sub(self.first_ns) as f64 / 1e9
     }
+
+    /// That it does not hold what it was to be used for.
+    pub(crate) fn unusable(&self, why: String) -> RosBagError {
+        RosBagError::Unusable { topic: self.name.clone(), type_name: self.type_name.clone(), why }
+    }
 }
 
 /// All topics, by name, and what was lost.

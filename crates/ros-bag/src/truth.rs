@@ -65,10 +65,7 @@ impl TruthReader {
         frames: Option<&(String, String)>,
         mounted: &StaticFrames,
     ) -> Result<Self, RosBagError> {
-        let refuse = |why: String| {
-            let (topic, type_name) = (topic.name.clone(), topic.type_name.clone());
-            RosBagError::Unusable { topic, type_name, why }
-        };
+        let refuse = |why: String| topic.unusable(why);
         if topic.type_name == TRANSFORMS {
             let listed: Vec<String> = topic.frames.keys().map(|(parent, child)| format!("{parent},{child}")).collect();
             let Some((parent, child)) = frames else {

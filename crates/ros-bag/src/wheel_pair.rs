@@ -94,11 +94,10 @@ fn number(survey: &Survey, text: &str) -> Result<WheelNumber, RosBagError> {
         None => match &topic.numbers[..] {
             [only] => only.clone(),
             all => {
-                let (topic, type_name) = (topic.name.clone(), topic.type_name.clone());
                 let numbers = if all.is_empty() { "none".to_owned() } else { all.join(", ") };
                 let why =
                     format!("which number is the wheel's is not plain; say {name}.PATH; its numbers are {numbers}");
-                return Err(RosBagError::Unusable { topic, type_name, why });
+                return Err(topic.unusable(why));
             }
         },
     };

@@ -112,10 +112,7 @@ pub(crate) fn has_joints(type_name: &str) -> bool {
 impl WheelReader {
     /// The reader of a topic; and the width of its counters, where its type says that.
     pub(crate) fn new(topic: &Topic, fields: &WheelFields) -> Result<(Self, Option<u8>), RosBagError> {
-        let refuse = |why: String| {
-            let (topic, type_name) = (topic.name.clone(), topic.type_name.clone());
-            RosBagError::Unusable { topic, type_name, why }
-        };
+        let refuse = |why: String| topic.unusable(why);
         match (&fields.left_field, &fields.right_field, fields.quantity) {
             (Some(left), Some(right), Some(quantity)) => {
                 return Ok((Self::Fields { left: left.clone(), right: right.clone(), quantity }, None));

@@ -11,7 +11,7 @@ use motion_programs::{Cost, DriveLimits, MotionProgram, Schedule};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{NoFit, ScenarioError};
-use crate::limits::{LENGTHS_M, MAX_RUNS};
+use crate::limits::{MAX_RUNS, Ranges};
 
 /// What a calibration may take.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -57,19 +57,11 @@ impl Part {
 
 impl Budget {
     pub(crate) fn check(&self, location: &str) -> Result<(), ScenarioError> {
-        let range = |key: &str, value: f64, holds: bool, must_be: &'static str| {
-            let key = format!("budget.{key}");
-            if holds {
-                Ok(())
-            } else {
-                Err(ScenarioError::OutOfRange { location: location.to_owned(), key, value, must_be })
-            }
-        };
-        let side = |key: &str, value: f64| range(key, value, LENGTHS_M.contains(&value), "from 0.001 to 10000 m");
-        side("room_x_m", self.room_x_m)?;
-        side("room_y_m", self.room_y_m)?;
+        let ranges = Ranges { location, prefix: "budget." };
+        ranges.length("room_x_m", self.room_x_m)?;
+        ranges.length("room_y_m", self.room_y_m)?;
         let within = (0.0..=1e4).contains(&self.clearance_m);
-        range("clearance_m", self.clearance_m, within, "from 0 to 10000 m")?;
+        ranges.range("clearance_m", self.clearance_m, within, "from 0 to 10000 m")?;
         let message = match (self.minutes, self.metres, self.handling_s) {
             (None, None, _) => "budget: say how much with minutes or with metres",
             (Some(_), Some(_), _) => "budget: minutes and metres are two budgets; leave one out",
@@ -80,11 +72,9 @@ impl Budget {
             return Err(ScenarioError::Toml { location: location.to_owned(), message: message.to_owned() });
         }
         for (key, value) in [("minutes", self.minutes), ("metres", self.metres)] {
-            let value = value.unwrap_or(1.0);
-            range(key, value, value.is_finite() && value > 0.0, "positive")?;
+            ranges.positive(key, value.unwrap_or(1.0))?;
         }
-        let handling_s = self.handling_s.unwrap_or(0.0);
-        range("handling_s", handling_s, handling_s.is_finite() && handling_s >= 0.0, "0 or more")
+        ranges.not_negative("handling_s", self.handling_s.unwrap_or(0.0))
     }
 
     /// Protocols that stay in the room and within the budget.

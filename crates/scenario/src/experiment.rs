@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::budget::Budget;
 use crate::error::{NoFit, ScenarioError};
 use crate::estimated::Estimated;
-use crate::limits::{LENGTHS_M, MAX_RUNS};
+use crate::limits::{MAX_RUNS, Ranges};
 use crate::robot::Robot;
 use crate::slam::Slam;
 use crate::sweep::Sweep;
@@ -186,143 +186,23 @@ impl Scenario {
     }
 
     pub(crate) fn check(&self, location: &str) -> Result<(), ScenarioError> {
-        let range = |key: &str, value: f64, holds: bool, must_be: &'static str| {
-            let error =
-                || ScenarioError::OutOfRange { location: location.to_owned(), key: key.to_owned(), value, must_be };
-            if holds { Ok(()) } else { Err(error()) }
-        };
-        let positive = |key: &str, value: f64| range(key, value, value.is_finite() && value > 0.0, "positive");
-        let not_negative = |key: &str, value: f64| range(key, value, value.is_finite() && value >= 0.0, "0 or more");
-        let finite = |key: &str, value: f64| range(key, value, value.is_finite(), "finite");
-        let length = |key: &str, value: f64| range(key, value, LENGTHS_M.contains(&value), "from 0.001 to 10000 m");
-        let speed = |key: &str, value: f64| range(key, value, (1e-3..=1e2).contains(&value), "from 0.001 to 100");
-        let interval =
-            |key: &str, value: f64| range(key, value, (1e-5..=1e3).contains(&value), "from 0.00001 to 1000 s");
-
+        let ranges = Ranges { location, prefix: "" };
         self.nominal_geometry().map_err(|source| ScenarioError::Geometry { location: location.to_owned(), source })?;
-        let robot = &self.robot;
-        speed("robot.cruise_speed_m_s", robot.cruise_speed_m_s)?;
-        speed("robot.acceleration_m_s2", robot.acceleration_m_s2)?;
-        let (lines, gear) = (robot.encoder.lines_per_rev, robot.encoder.gear_ratio);
-        range("robot.encoder.lines_per_rev", lines, (1.0..=1e6).contains(&lines), "from 1 to 1000000")?;
-        range("robot.encoder.gear_ratio", gear, (1e-3..=1e6).contains(&gear), "from 0.001 to 1000000")?;
-        length("robot.left_wheel_diameter_m", robot.left_wheel_diameter_m)?;
-        length("robot.right_wheel_diameter_m", robot.right_wheel_diameter_m)?;
-        length("robot.wheel_separation_m", robot.wheel_separation_m)?;
-        let width_error = robot.encoder.state_width_error;
-        range("robot.encoder.state_width_error", width_error, (0.0..1.0).contains(&width_error), "in [0, 1)")?;
-        not_negative("robot.controller.right_phase_s", robot.controller.right_phase_s)?;
-        positive("robot.controller.clock_hz", robot.controller.clock_hz)?;
-        positive("robot.motor.supply_v", robot.motor.supply_v)?;
-        positive("robot.motor.resistance_ohm", robot.motor.resistance_ohm)?;
-        positive("robot.motor.torque_constant_nm_a", robot.motor.torque_constant_nm_a)?;
-        positive("robot.motor.inertia_kg_m2", robot.motor.inertia_kg_m2)?;
-        not_negative("robot.motor.viscous_friction_nm_s", robot.motor.viscous_friction_nm_s)?;
-        not_negative("robot.motor.coulomb_friction_nm", robot.motor.coulomb_friction_nm)?;
-        for mark in &robot.points {
-            finite("robot.point.x_m", mark.x_m)?;
-            finite("robot.point.y_m", mark.y_m)?;
-        }
-        let points = &robot.points;
-        let twice = points.iter().enumerate().find(|(k, mark)| points[..*k].iter().any(|other| other.id == mark.id));
-        if let Some((_, mark)) = twice {
-            let message = format!("two [[robot.point]] have the id \"{}\"; ids must differ", mark.id);
-            return Err(ScenarioError::Toml { location: location.to_owned(), message });
-        }
+        check_robot(&self.robot, ranges)?;
         if let Engine::Stepping { step_s } = self.engine {
-            range("engine.step_s", step_s, (1e-6..=1e-3).contains(&step_s), "from 0.000001 to 0.001 s")?;
+            ranges.range("engine.step_s", step_s, (1e-6..=1e-3).contains(&step_s), "from 0.000001 to 0.001 s")?;
         }
-        not_negative("noise.wheel_sigma_m_per_sqrt_m", self.noise.wheel_sigma_m_per_sqrt_m)?;
-        not_negative("noise.sensitivity_sigma", self.noise.sensitivity_sigma)?;
-        not_negative("placement.half_width_m", self.placement.half_width_m)?;
-        not_negative("placement.half_width_rad", self.placement.half_width_rad)?;
+        ranges.not_negative("noise.wheel_sigma_m_per_sqrt_m", self.noise.wheel_sigma_m_per_sqrt_m)?;
+        ranges.not_negative("noise.sensitivity_sigma", self.noise.sensitivity_sigma)?;
+        ranges.not_negative("placement.half_width_m", self.placement.half_width_m)?;
+        ranges.not_negative("placement.half_width_rad", self.placement.half_width_rad)?;
         if let Some(log) = self.log {
-            interval("log.interval_s", log.interval_s)?;
+            ranges.interval("log.interval_s", log.interval_s)?;
         }
         let instruments = self.instruments.len() as f64;
-        range(
-            "instrument",
-            instruments,
-            !self.instruments.is_empty(),
-            "at least one: nothing else measures the truth",
-        )?;
+        ranges.range("instrument", instruments, instruments > 0.0, "at least one: nothing else measures the truth")?;
         for instrument in &self.instruments {
-            match *instrument {
-                Instrument::FloorGrid { resolution_m, reading_sigma_m } => {
-                    not_negative("instrument.resolution_m", resolution_m)?;
-                    not_negative("instrument.reading_sigma_m", reading_sigma_m)?;
-                    let marks = robot.points.len() as f64;
-                    let must_be = "at least two points with a floor grid: one point gives no heading";
-                    range("robot.point", marks, robot.points.len() >= 2, must_be)?;
-                }
-                Instrument::MotionCapture {
-                    rate_hz,
-                    sigma_xy_m,
-                    sigma_theta_rad,
-                    latency_s,
-                    lever_x_m,
-                    lever_y_m,
-                    lever_theta_rad,
-                } => {
-                    interval("1 / instrument.rate_hz", 1.0 / rate_hz)?;
-                    not_negative("instrument.sigma_xy_m", sigma_xy_m)?;
-                    not_negative("instrument.sigma_theta_rad", sigma_theta_rad)?;
-                    not_negative("instrument.latency_s", latency_s)?;
-                    finite("instrument.lever_x_m", lever_x_m)?;
-                    finite("instrument.lever_y_m", lever_y_m)?;
-                    finite("instrument.lever_theta_rad", lever_theta_rad)?;
-                }
-                Instrument::Slam(slam) => {
-                    interval("1 / instrument.rate_hz", 1.0 / slam.rate_hz)?;
-                    slam.not_negative().into_iter().try_for_each(|(key, value)| not_negative(key, value))?;
-                    length("instrument.map_length_m", slam.map_length_m)?;
-                    positive("instrument.wander_tau_s", slam.wander_tau_s)?;
-                    let scale_error = slam.map_scale_error;
-                    let holds = (-0.5..=0.5).contains(&scale_error);
-                    range("instrument.map_scale_error", scale_error, holds, "from -0.5 to 0.5")?;
-                }
-                Instrument::Tachometer { rate_hz, sigma_m_s } => {
-                    interval("1 / instrument.rate_hz", 1.0 / rate_hz)?;
-                    not_negative("instrument.sigma_m_s", sigma_m_s)?;
-                }
-                Instrument::Gyro {
-                    noise_rad_per_sqrt_s,
-                    bias_radps,
-                    bias_walk_radps_per_sqrt_s,
-                    scale,
-                    scale_sigma,
-                    still_s,
-                } => {
-                    not_negative("instrument.noise_rad_per_sqrt_s", noise_rad_per_sqrt_s)?;
-                    finite("instrument.bias_radps", bias_radps)?;
-                    not_negative("instrument.bias_walk_radps_per_sqrt_s", bias_walk_radps_per_sqrt_s)?;
-                    range("instrument.scale", scale, (-0.5..=0.5).contains(&scale), "from -0.5 to 0.5")?;
-                    not_negative("instrument.scale_sigma", scale_sigma)?;
-                    range("instrument.still_s", still_s, (0.0..=1e3).contains(&still_s), "from 0 to 1000 s")?;
-                }
-                Instrument::Tape { sigma_m } => positive("instrument.sigma_m", sigma_m)?,
-                Instrument::Wall(wall) => {
-                    interval("1 / instrument.rate_hz", 1.0 / wall.rate_hz)?;
-                    not_negative("instrument.sigma_m", wall.sigma_m)?;
-                    not_negative("instrument.sigma_rad", wall.sigma_rad)?;
-                    positive("instrument.sigma_m + instrument.sigma_rad", wall.sigma_m + wall.sigma_rad)?;
-                    length("instrument.range_m", wall.range_m)?;
-                    length("instrument.wall_distance_m", wall.wall_distance_m)?;
-                    wall.finite().into_iter().try_for_each(|(key, value)| finite(key, value))?;
-                    range("instrument.still_s", wall.still_s, (0.0..=1e3).contains(&wall.still_s), "from 0 to 1000 s")?;
-                    let is_elsewhere =
-                        |of: &Instrument| matches!(of, Instrument::Wall(of) if of.lever() != wall.lever());
-                    if self.instruments.iter().any(is_elsewhere) {
-                        let message = "two walls with different lever_x_m, lever_y_m or lever_theta_rad: one lidar sees all walls";
-                        return Err(ScenarioError::Toml { location: location.to_owned(), message: message.to_owned() });
-                    }
-                }
-                Instrument::Revisit { sigma_xy_m, sigma_theta_rad } => {
-                    not_negative("instrument.sigma_xy_m", sigma_xy_m)?;
-                    not_negative("instrument.sigma_theta_rad", sigma_theta_rad)?;
-                    positive("instrument.sigma_xy_m + instrument.sigma_theta_rad", sigma_xy_m + sigma_theta_rad)?;
-                }
-            }
+            self.check_instrument(*instrument, ranges)?;
         }
         for effect in &self.effects {
             effect
@@ -334,12 +214,12 @@ impl Scenario {
             budget.check(location)?;
         }
         if let Some(Estimated { sensor_x_m, sensor_y_m, sensor_theta_rad, latency_s, terms }) = &self.estimated {
-            finite("estimated.sensor_x_m", *sensor_x_m)?;
-            finite("estimated.sensor_y_m", *sensor_y_m)?;
-            finite("estimated.sensor_theta_rad", *sensor_theta_rad)?;
-            finite("estimated.latency_s", *latency_s)?;
+            ranges.finite("estimated.sensor_x_m", *sensor_x_m)?;
+            ranges.finite("estimated.sensor_y_m", *sensor_y_m)?;
+            ranges.finite("estimated.sensor_theta_rad", *sensor_theta_rad)?;
+            ranges.finite("estimated.latency_s", *latency_s)?;
             for (name, value) in terms.iter().flat_map(|term| &term.values) {
-                finite(&format!("estimated.term.values.{name}"), *value)?;
+                ranges.finite(&format!("estimated.term.values.{name}"), *value)?;
             }
         }
         self.check_protocols(location, "protocol", &self.protocols)?;
@@ -349,6 +229,89 @@ impl Scenario {
         }
         if !sweep.validation.is_empty() {
             check_schedules(location, "sweep.validation", &sweep.validation)?;
+        }
+        Ok(())
+    }
+
+    fn check_instrument(&self, instrument: Instrument, ranges: Ranges<'_>) -> Result<(), ScenarioError> {
+        let still = |still_s: f64| {
+            ranges.range("instrument.still_s", still_s, (0.0..=1e3).contains(&still_s), "from 0 to 1000 s")
+        };
+        let share = |key: &str, value: f64| ranges.range(key, value, (-0.5..=0.5).contains(&value), "from -0.5 to 0.5");
+        match instrument {
+            Instrument::FloorGrid { resolution_m, reading_sigma_m } => {
+                ranges.not_negative("instrument.resolution_m", resolution_m)?;
+                ranges.not_negative("instrument.reading_sigma_m", reading_sigma_m)?;
+                let marks = self.robot.points.len() as f64;
+                let must_be = "at least two points with a floor grid: one point gives no heading";
+                ranges.range("robot.point", marks, self.robot.points.len() >= 2, must_be)?;
+            }
+            Instrument::MotionCapture {
+                rate_hz,
+                sigma_xy_m,
+                sigma_theta_rad,
+                latency_s,
+                lever_x_m,
+                lever_y_m,
+                lever_theta_rad,
+            } => {
+                ranges.interval("1 / instrument.rate_hz", 1.0 / rate_hz)?;
+                ranges.not_negative("instrument.sigma_xy_m", sigma_xy_m)?;
+                ranges.not_negative("instrument.sigma_theta_rad", sigma_theta_rad)?;
+                ranges.not_negative("instrument.latency_s", latency_s)?;
+                ranges.finite("instrument.lever_x_m", lever_x_m)?;
+                ranges.finite("instrument.lever_y_m", lever_y_m)?;
+                ranges.finite("instrument.lever_theta_rad", lever_theta_rad)?;
+            }
+            Instrument::Slam(slam) => {
+                ranges.interval("1 / instrument.rate_hz", 1.0 / slam.rate_hz)?;
+                slam.not_negative().into_iter().try_for_each(|(key, value)| ranges.not_negative(key, value))?;
+                ranges.length("instrument.map_length_m", slam.map_length_m)?;
+                ranges.positive("instrument.wander_tau_s", slam.wander_tau_s)?;
+                share("instrument.map_scale_error", slam.map_scale_error)?;
+            }
+            Instrument::Tachometer { rate_hz, sigma_m_s } => {
+                ranges.interval("1 / instrument.rate_hz", 1.0 / rate_hz)?;
+                ranges.not_negative("instrument.sigma_m_s", sigma_m_s)?;
+            }
+            Instrument::Gyro {
+                noise_rad_per_sqrt_s,
+                bias_radps,
+                bias_walk_radps_per_sqrt_s,
+                scale,
+                scale_sigma,
+                still_s,
+            } => {
+                ranges.not_negative("instrument.noise_rad_per_sqrt_s", noise_rad_per_sqrt_s)?;
+                ranges.finite("instrument.bias_radps", bias_radps)?;
+                ranges.not_negative("instrument.bias_walk_radps_per_sqrt_s", bias_walk_radps_per_sqrt_s)?;
+                share("instrument.scale", scale)?;
+                ranges.not_negative("instrument.scale_sigma", scale_sigma)?;
+                still(still_s)?;
+            }
+            Instrument::Tape { sigma_m } => ranges.positive("instrument.sigma_m", sigma_m)?,
+            Instrument::Wall(wall) => {
+                ranges.interval("1 / instrument.rate_hz", 1.0 / wall.rate_hz)?;
+                ranges.not_negative("instrument.sigma_m", wall.sigma_m)?;
+                ranges.not_negative("instrument.sigma_rad", wall.sigma_rad)?;
+                ranges.positive("instrument.sigma_m + instrument.sigma_rad", wall.sigma_m + wall.sigma_rad)?;
+                ranges.length("instrument.range_m", wall.range_m)?;
+                ranges.length("instrument.wall_distance_m", wall.wall_distance_m)?;
+                wall.finite().into_iter().try_for_each(|(key, value)| ranges.finite(key, value))?;
+                still(wall.still_s)?;
+                let is_elsewhere = |of: &Instrument| matches!(of, Instrument::Wall(of) if of.lever() != wall.lever());
+                if self.instruments.iter().any(is_elsewhere) {
+                    let message =
+                        "two walls with different lever_x_m, lever_y_m or lever_theta_rad: one lidar sees all walls";
+                    let (location, message) = (ranges.location.to_owned(), message.to_owned());
+                    return Err(ScenarioError::Toml { location, message });
+                }
+            }
+            Instrument::Revisit { sigma_xy_m, sigma_theta_rad } => {
+                ranges.not_negative("instrument.sigma_xy_m", sigma_xy_m)?;
+                ranges.not_negative("instrument.sigma_theta_rad", sigma_theta_rad)?;
+                ranges.positive("instrument.sigma_xy_m + instrument.sigma_theta_rad", sigma_xy_m + sigma_theta_rad)?;
+            }
         }
         Ok(())
     }
@@ -364,45 +327,70 @@ impl Scenario {
     }
 }
 
+fn check_robot(robot: &Robot, ranges: Ranges<'_>) -> Result<(), ScenarioError> {
+    let speed = |key: &str, value: f64| ranges.range(key, value, (1e-3..=1e2).contains(&value), "from 0.001 to 100");
+    speed("robot.cruise_speed_m_s", robot.cruise_speed_m_s)?;
+    speed("robot.acceleration_m_s2", robot.acceleration_m_s2)?;
+    let (lines, gear) = (robot.encoder.lines_per_rev, robot.encoder.gear_ratio);
+    ranges.range("robot.encoder.lines_per_rev", lines, (1.0..=1e6).contains(&lines), "from 1 to 1000000")?;
+    ranges.range("robot.encoder.gear_ratio", gear, (1e-3..=1e6).contains(&gear), "from 0.001 to 1000000")?;
+    ranges.length("robot.left_wheel_diameter_m", robot.left_wheel_diameter_m)?;
+    ranges.length("robot.right_wheel_diameter_m", robot.right_wheel_diameter_m)?;
+    ranges.length("robot.wheel_separation_m", robot.wheel_separation_m)?;
+    let width_error = robot.encoder.state_width_error;
+    ranges.range("robot.encoder.state_width_error", width_error, (0.0..1.0).contains(&width_error), "in [0, 1)")?;
+    ranges.not_negative("robot.controller.right_phase_s", robot.controller.right_phase_s)?;
+    ranges.positive("robot.controller.clock_hz", robot.controller.clock_hz)?;
+    ranges.positive("robot.motor.supply_v", robot.motor.supply_v)?;
+    ranges.positive("robot.motor.resistance_ohm", robot.motor.resistance_ohm)?;
+    ranges.positive("robot.motor.torque_constant_nm_a", robot.motor.torque_constant_nm_a)?;
+    ranges.positive("robot.motor.inertia_kg_m2", robot.motor.inertia_kg_m2)?;
+    ranges.not_negative("robot.motor.viscous_friction_nm_s", robot.motor.viscous_friction_nm_s)?;
+    ranges.not_negative("robot.motor.coulomb_friction_nm", robot.motor.coulomb_friction_nm)?;
+    for mark in &robot.points {
+        ranges.finite("robot.point.x_m", mark.x_m)?;
+        ranges.finite("robot.point.y_m", mark.y_m)?;
+    }
+    let points = &robot.points;
+    let twice = points.iter().enumerate().find(|(k, mark)| points[..*k].iter().any(|other| other.id == mark.id));
+    if let Some((_, mark)) = twice {
+        let message = format!("two [[robot.point]] have the id \"{}\"; ids must differ", mark.id);
+        return Err(ScenarioError::Toml { location: ranges.location.to_owned(), message });
+    }
+    Ok(())
+}
+
 /// Whether schedules, the ones at `key`, can be driven at all.
 fn check_schedules(location: &str, key: &str, schedules: &[Schedule]) -> Result<(), ScenarioError> {
-    let range = |last: &str, value: f64, holds: bool, must_be: &'static str| {
-        let key = format!("{key}.{last}");
-        if holds {
-            Ok(())
-        } else {
-            Err(ScenarioError::OutOfRange { location: location.to_owned(), key, value, must_be })
-        }
-    };
-    let length = |last: &str, value: f64| range(last, value, LENGTHS_M.contains(&value), "from 0.001 to 10000 m");
+    let ranges = Ranges { location, prefix: &format!("{key}.") };
     for part in schedules {
         match *part {
-            Schedule::Straights { length_m, .. } => length("length_m", length_m)?,
+            Schedule::Straights { length_m, .. } => ranges.length("length_m", length_m)?,
             Schedule::Spins { turn_rad, .. } => {
-                range("turn_rad", turn_rad, (1e-3..=1e4).contains(&turn_rad), "from 0.001 to 10000 rad")?;
+                ranges.range("turn_rad", turn_rad, (1e-3..=1e4).contains(&turn_rad), "from 0.001 to 10000 rad")?;
             }
             Schedule::SpinsAtSpeeds { turn_rad, slowest_m_s, fastest_m_s, speeds, .. } => {
-                range("turn_rad", turn_rad, (1e-3..=1e4).contains(&turn_rad), "from 0.001 to 10000 rad")?;
-                range("slowest_m_s", slowest_m_s, (1e-3..=1e2).contains(&slowest_m_s), "from 0.001 to 100")?;
+                ranges.range("turn_rad", turn_rad, (1e-3..=1e4).contains(&turn_rad), "from 0.001 to 10000 rad")?;
+                ranges.range("slowest_m_s", slowest_m_s, (1e-3..=1e2).contains(&slowest_m_s), "from 0.001 to 100")?;
                 let holds = fastest_m_s > slowest_m_s && fastest_m_s <= 1e2;
-                range("fastest_m_s", fastest_m_s, holds, "above slowest_m_s, and 100 at most")?;
-                range("speeds", f64::from(speeds), (2..=100).contains(&speeds), "from 2 to 100")?;
+                ranges.range("fastest_m_s", fastest_m_s, holds, "above slowest_m_s, and 100 at most")?;
+                ranges.range("speeds", f64::from(speeds), (2..=100).contains(&speeds), "from 2 to 100")?;
             }
-            Schedule::Squares { side_m, .. } => length("side_m", side_m)?,
+            Schedule::Squares { side_m, .. } => ranges.length("side_m", side_m)?,
             Schedule::Circles { radius_m, turns, .. } => {
-                length("radius_m", radius_m)?;
+                ranges.length("radius_m", radius_m)?;
                 let turns = turns.unwrap_or(1.0);
-                range("turns", turns, (0.25..=1e3).contains(&turns), "from 0.25 to 1000")?;
+                ranges.range("turns", turns, (0.25..=1e3).contains(&turns), "from 0.25 to 1000")?;
             }
             Schedule::ValidationPath { length_m, measure_every_m, .. } => {
-                length("length_m", length_m)?;
+                ranges.length("length_m", length_m)?;
                 let holds = measure_every_m >= 1e-3 && measure_every_m <= length_m;
-                range("measure_every_m", measure_every_m, holds, "from 0.001 m to length_m")?;
+                ranges.range("measure_every_m", measure_every_m, holds, "from 0.001 m to length_m")?;
             }
         }
     }
     let runs: u64 = schedules.iter().map(Schedule::runs).sum();
-    range("runs", runs as f64, (1..=MAX_RUNS).contains(&runs), "from 1 to 100000 in all")
+    ranges.range("runs", runs as f64, (1..=MAX_RUNS).contains(&runs), "from 1 to 100000 in all")
 }
 
 #[cfg(test)]

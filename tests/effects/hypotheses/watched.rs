@@ -1,7 +1,7 @@
 //! A robot without any imperfection but the one, watched exactly, and what counts and a mean term predict of
 //! it.
 
-use dataset::{Dataset, Protocol, ProtocolSettings, Run, WheelLog};
+use dataset::{Dataset, Protocol, ProtocolSettings, Run, RunInfo, WheelLog};
 use effects::Forward;
 use kinematics::{Increment, Pose, Twist, Wheels};
 use model_term::{Interval, Measurement, ModelTerm, NoRecord};
@@ -116,6 +116,24 @@ pub(crate) enum Watch {
     LookByLook,
 }
 
+/// What a term of these sizes adds to a measurement at a pose.
+fn measured_by_term(
+    term: &mut dyn ModelTerm,
+    values: &[f64],
+    run: &RunInfo,
+    t_s: f64,
+    world_from_body: Pose,
+    twist: Twist,
+) -> Pose {
+    let mut gradient = vec![Pose::IDENTITY; values.len()];
+    let twist_of_terms = Twist::default();
+    term.measurement(
+        &Measurement { t_s, world_from_body, twist, twist_of_terms, record: &NoRecord, run },
+        &mut gradient,
+    );
+    sum(&gradient, values)
+}
+
 /// Largest difference, metres or radians, between what was seen and what the counts and a term of these sizes
 /// predict.
 pub(crate) fn missed(dataset: &Dataset, term: &mut dyn ModelTerm, values: &[f64], watch: Watch) -> f64 {
@@ -126,27 +144,12 @@ pub(crate) fn missed(dataset: &Dataset, term: &mut dyn ModelTerm, values: &[f64]
     for run in &dataset.runs {
         term.restart(&run.info);
         let mut gradient = vec![Pose::IDENTITY; values.len()];
-        let sighted = |term: &mut dyn ModelTerm, t_s, world_from_body, twist| {
-            let mut gradient = vec![Pose::IDENTITY; values.len()];
-            term.measurement(
-                &Measurement {
-                    t_s,
-                    world_from_body,
-                    twist,
-                    twist_of_terms: Twist::default(),
-                    record: &NoRecord,
-                    run: &run.info,
-                },
-                &mut gradient,
-            );
-            sum(&gradient, values)
-        };
         let seen = |k: usize| {
             let sample = &run.truth[k];
             Pose::new(sample.x_m, sample.y_m, sample.theta_rad().expect("poses"))
         };
         // The first measurement is at the robot at rest.
-        let body_from_seen = sighted(term, run.truth[0].t_s, seen(0), Twist::default());
+        let body_from_seen = measured_by_term(term, values, &run.info, run.truth[0].t_s, seen(0), Twist::default());
         let mut pose = seen(0) * body_from_seen.inverse();
         let mut measurement = 1;
         let rows = rows(run, ticks_per_rev);
@@ -199,7 +202,7 @@ pub(crate) fn missed(dataset: &Dataset, term: &mut dyn ModelTerm, values: &[f64]
             while measurement < run.truth.len() && run.truth[measurement].t_s <= row.t_s + row.dt_s + 1e-9 {
                 let t_s = run.truth[measurement].t_s;
                 let here = pose * share((t_s - row.t_s) / row.dt_s);
-                let predicted = here * sighted(term, t_s, here, twist);
+                let predicted = here * measured_by_term(term, values, &run.info, t_s, here, twist);
                 if t_s > from_s {
                     worst = worst.max(difference(predicted, seen(measurement)));
                     (squares, measurements) =

@@ -72,33 +72,7 @@ pub(crate) fn scenario_of(
     for fault in faults {
         effects.push(simulated(fault.id, &fault.values)?);
     }
-    let mut at = 0;
-    let mut terms = Vec::new();
-    let in_model = model.candidates.iter().map(|candidate| {
-        let own = at..at + candidate.parameters().len();
-        at = own.end;
-        (candidate, fit.model.term_values[own].to_vec())
-    });
-    let in_stamps = stamps
-        .map(|error| (&error.candidate, error.test.estimates.iter().map(|(value, _)| *value).collect::<Vec<f64>>()));
-    for (candidate, fitted) in in_model.chain(in_stamps) {
-        let parameters = candidate.parameters();
-        let effect = match candidate {
-            Candidate::Effect { id, .. } => {
-                let named = parameters.iter().zip(&fitted).map(|(parameter, size)| (parameter.name, *size));
-                let estimates: Vec<(&str, f64)> = named.chain(candidate.fixed()).collect();
-                let values = estimates.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
-                terms.push(EstimatedTerm { kind: (*id).to_owned(), values });
-                simulated(id, &estimates)?
-            }
-            Candidate::Deviation { .. } => return Err("a deviation from a form has no simulation model".to_owned()),
-            Candidate::Sparse(sparse) => {
-                Effect::Term(SparseTerm::new(sparse, fitted.iter().sum(), values_of_runs(sparse, model)))
-            }
-        };
-        effect.physical().check().map_err(|error| error.to_string())?;
-        effects.push(effect);
-    }
+    let terms = add_fitted(&mut effects, model, stamps)?;
     effects::sort_by_stage(&mut effects);
     let name = first.provenance.name.as_deref().unwrap_or("dataset");
     let scenario = Scenario {
@@ -126,6 +100,43 @@ pub(crate) fn scenario_of(
     // What is written must be readable.
     let text = scenario.to_toml().map_err(|error| error.to_string())?;
     Scenario::parse(&text, "extended.toml").map_err(|error| error.to_string())
+}
+
+/// Adds the effects that were found, those of the model before those of the stamps. Gives their mean terms as
+/// they were fitted.
+fn add_fitted(
+    effects: &mut Vec<Effect>,
+    model: &AugmentedModel<'_>,
+    stamps: Option<&StampError>,
+) -> Result<Vec<EstimatedTerm>, String> {
+    let mut at = 0;
+    let mut terms = Vec::new();
+    let in_model = model.candidates.iter().map(|candidate| {
+        let range = at..at + candidate.parameters().len();
+        at = range.end;
+        (candidate, model.fit.solution.model.term_values[range].to_vec())
+    });
+    let in_stamps = stamps
+        .map(|error| (&error.candidate, error.test.estimates.iter().map(|(value, _)| *value).collect::<Vec<f64>>()));
+    for (candidate, fitted) in in_model.chain(in_stamps) {
+        let parameters = candidate.parameters();
+        let effect = match candidate {
+            Candidate::Effect { id, .. } => {
+                let named = parameters.iter().zip(&fitted).map(|(parameter, size)| (parameter.name, *size));
+                let estimates: Vec<(&str, f64)> = named.chain(candidate.fixed()).collect();
+                let values = estimates.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
+                terms.push(EstimatedTerm { kind: (*id).to_owned(), values });
+                simulated(id, &estimates)?
+            }
+            Candidate::Deviation { .. } => return Err("a deviation from a form has no simulation model".to_owned()),
+            Candidate::Sparse(sparse) => {
+                Effect::Term(SparseTerm::new(sparse, fitted.iter().sum(), values_of_runs(sparse, model)))
+            }
+        };
+        effect.physical().check().map_err(|error| error.to_string())?;
+        effects.push(effect);
+    }
+    Ok(terms)
 }
 
 fn simulated(id: &str, estimates: &[(&str, f64)]) -> Result<Effect, String> {

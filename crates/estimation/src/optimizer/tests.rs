@@ -1,6 +1,6 @@
 //! Steps as they are taken, and start headings, against what is known of them on paper.
 
-use kinematics::Wheels;
+use kinematics::{Pose, Wheels};
 
 use super::*;
 use crate::normal_equations::NormalEquations;

@@ -376,8 +376,7 @@ fn innovations_that_were_left_out_are_found_again() {
 fn a_start_heading_is_that_of_the_path() {
     let dataset = dataset(false);
     let records = Records::of(&[dataset.session()]);
-    let found: Vec<f64> =
-        records.segments.iter().map(|segment| crate::optimizer::start_heading(segment, &CENTRED_MODEL, 0)).collect();
+    let found = records.start_headings_rad(&CENTRED_MODEL);
     // Runs start at 0.5 and 1.5 rad; 3 mm over some decimetres.
     assert!((found[0] - 0.5).abs() < 0.03 && (found[1] - 1.5).abs() < 0.03, "{found:?}");
 }

@@ -26,52 +26,7 @@ pub(super) fn run(
 ) -> Result<Run, DatasetError> {
     let part = &parts[raw.part];
     let t_s: Vec<f64> = raw.rows.iter().map(|&row| seconds(raw.start, part.log.time[row])).collect();
-    let wheels = match (units.wheels, &part.log.wheels) {
-        (WheelUnits::Wheels(Unit::TicksPerRow), Some([left, right])) => WheelLog::Ticks(Wheels {
-            left: sums(counts(part, Quantity::Left, raw, left)?, i64::wrapping_add),
-            right: sums(counts(part, Quantity::Right, raw, right)?, i64::wrapping_add),
-        }),
-        (WheelUnits::Wheels(unit @ (Unit::RadPerRow | Unit::MPerRow)), Some([left, right])) => {
-            let m_per_rad = drive.geometry.m_per_rad();
-            let angle = |column: &[f64], m_per_rad: f64| {
-                let scale = if unit == Unit::MPerRow { 1.0 / m_per_rad } else { 1.0 };
-                sums(raw.rows.iter().map(|&row| column[row] * scale).collect(), |sum, step| sum + step)
-            };
-            WheelLog::Angles(Wheels { left: angle(left, m_per_rad.left), right: angle(right, m_per_rad.right) })
-        }
-        (WheelUnits::Wheels(Unit::Ticks), Some([left, right])) => WheelLog::Ticks(Wheels {
-            left: counts(part, Quantity::Left, raw, left)?,
-            right: counts(part, Quantity::Right, raw, right)?,
-        }),
-        (WheelUnits::Wheels(unit), Some(columns)) if unit.is_rate() => {
-            let m = drive.m_per_unit(unit).unwrap_or(Wheels::both(1.0));
-            let [left, right] = columns.each_ref().map(|column| rates(raw, column, drive.rates));
-            // Of contacts the unit's own quotient: the bits of the text in metres a second.
-            let scaled = |column: Vec<f64>, m: f64| {
-                let in_m_s = |value: f64| if unit.is_of_contact() { unit.to_si(value) } else { value * m };
-                column.into_iter().map(in_m_s).collect()
-            };
-            WheelLog::Speeds(Wheels { left: scaled(left, m.left), right: scaled(right, m.right) })
-        }
-        (WheelUnits::Wheels(unit), Some([left, right])) => {
-            let m_per_rad = drive.geometry.m_per_rad();
-            let angle = |column: &[f64], m_per_rad: f64| {
-                let of = |&row: &usize| {
-                    let value = unit.to_si(column[row]);
-                    if Unit::LENGTHS.contains(&unit) { value / m_per_rad } else { value }
-                };
-                raw.rows.iter().map(of).collect()
-            };
-            WheelLog::Angles(Wheels { left: angle(left, m_per_rad.left), right: angle(right, m_per_rad.right) })
-        }
-        (WheelUnits::Twist([speed, yaw_rate]), Some([v, omega])) => {
-            let si = |column: &[f64], unit: Unit| {
-                rates(raw, column, drive.rates).into_iter().map(|value| unit.to_si(value)).collect()
-            };
-            WheelLog::Twist { v_mps: si(v, speed), omega_radps: si(omega, yaw_rate) }
-        }
-        (_, None) => WheelLog::default(),
-    };
+    let wheels = wheel_log(part, raw, units.wheels, drive)?;
     let truth_part = &parts[raw.truth_part];
     let mut truth = Vec::with_capacity(raw.truth_rows.len());
     if let Some(pose) = &truth_part.log.pose {
@@ -108,17 +63,65 @@ pub(super) fn run(
     })
 }
 
-fn counts(part: &Part, side: Quantity, raw: &RawRun, column: &[f64]) -> Result<Vec<i64>, DatasetError> {
-    let count = |&row: &usize| {
-        let value = column[row];
-        if value.fract() == 0.0 && value.abs() <= LARGEST_COUNT {
-            return Ok(value as i64);
+/// The wheels of a run in a unit.
+fn wheel_log(part: &Part, raw: &RawRun, units: WheelUnits, drive: &Drive) -> Result<WheelLog, DatasetError> {
+    Ok(match (units, &part.log.wheels) {
+        (WheelUnits::Wheels(Unit::TicksPerRow), Some(columns)) => {
+            WheelLog::Ticks(counts(part, raw, columns)?.map(|steps| sums(steps, i64::wrapping_add)))
         }
-        let column = part.sheet.names[part.roles.of[&side].index].clone();
-        let (file, line) = (part.sheet.file.clone(), part.log.lines[row]);
-        Err(DatasetError::NotACount { file, line, column, found: value.to_string() })
+        (WheelUnits::Wheels(unit @ (Unit::RadPerRow | Unit::MPerRow)), Some([left, right])) => {
+            let angle = |m_per_rad: f64, column: &Vec<f64>| {
+                let scale = if unit == Unit::MPerRow { 1.0 / m_per_rad } else { 1.0 };
+                sums(raw.rows.iter().map(|&row| column[row] * scale).collect(), |sum, step| sum + step)
+            };
+            WheelLog::Angles(drive.geometry.m_per_rad().zip_with(Wheels { left, right }, angle))
+        }
+        (WheelUnits::Wheels(Unit::Ticks), Some(columns)) => WheelLog::Ticks(counts(part, raw, columns)?),
+        (WheelUnits::Wheels(unit), Some(columns)) if unit.is_rate() => {
+            let m = drive.m_per_unit(unit).unwrap_or(Wheels::both(1.0));
+            let [left, right] = columns.each_ref().map(|column| rates(raw, column, drive.rates));
+            // Of contacts the unit's own quotient: the bits of the text in metres a second.
+            let scaled = |column: Vec<f64>, m: f64| {
+                let in_m_s = |value: f64| if unit.is_of_contact() { unit.to_si(value) } else { value * m };
+                column.into_iter().map(in_m_s).collect()
+            };
+            WheelLog::Speeds(Wheels { left: scaled(left, m.left), right: scaled(right, m.right) })
+        }
+        (WheelUnits::Wheels(unit), Some([left, right])) => {
+            let angle = |m_per_rad: f64, column: &Vec<f64>| {
+                let of = |&row: &usize| {
+                    let value = unit.to_si(column[row]);
+                    if Unit::LENGTHS.contains(&unit) { value / m_per_rad } else { value }
+                };
+                raw.rows.iter().map(of).collect()
+            };
+            WheelLog::Angles(drive.geometry.m_per_rad().zip_with(Wheels { left, right }, angle))
+        }
+        (WheelUnits::Twist([speed, yaw_rate]), Some([v, omega])) => {
+            let si = |column: &[f64], unit: Unit| {
+                rates(raw, column, drive.rates).into_iter().map(|value| unit.to_si(value)).collect()
+            };
+            WheelLog::Twist { v_mps: si(v, speed), omega_radps: si(omega, yaw_rate) }
+        }
+        (_, None) => WheelLog::default(),
+    })
+}
+
+/// The counts of both wheels.
+fn counts(part: &Part, raw: &RawRun, [left, right]: &[Vec<f64>; 2]) -> Result<Wheels<Vec<i64>>, DatasetError> {
+    let counts = |side: Quantity, column: &[f64]| -> Result<Vec<i64>, DatasetError> {
+        let count = |&row: &usize| {
+            let value = column[row];
+            if value.fract() == 0.0 && value.abs() <= LARGEST_COUNT {
+                return Ok(value as i64);
+            }
+            let column = part.sheet.names[part.roles.of[&side].index].clone();
+            let (file, line) = (part.sheet.file.clone(), part.log.lines[row]);
+            Err(DatasetError::NotACount { file, line, column, found: value.to_string() })
+        };
+        raw.rows.iter().map(count).collect()
     };
-    raw.rows.iter().map(count).collect()
+    Ok(Wheels { left: counts(Quantity::Left, left)?, right: counts(Quantity::Right, right)? })
 }
 
 /// Sums of what was moved row by row, from nothing at the first row.

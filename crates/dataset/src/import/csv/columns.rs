@@ -78,10 +78,7 @@ fn mapped(sheet: &Sheet, column: &str) -> Option<usize> {
 pub(super) fn refuse_unknown_columns(sheets: &[(Sheet, FileRole)], options: &Options) -> Result<(), DatasetError> {
     let runs_by = options.runs_by.iter().map(|column| (FileRole::Any, column, "--runs-by"));
     let columns = options.map.iter().map(|entry| (entry.role, &entry.column, "--map")).chain(runs_by);
-    let refused = |message: String| {
-        let first = &sheets[0].0;
-        Err(DatasetError::Foreign { file: first.file.clone(), line: first.header_line.unwrap_or(1), message })
-    };
+    let refused = |message: String| Err(sheets[0].0.foreign_header(message));
     for (of, column, flag) in columns {
         let meant: Vec<&Sheet> =
             sheets.iter().filter(|(_, role)| of == FileRole::Any || of == *role).map(|(sheet, _)| sheet).collect();
@@ -108,18 +105,23 @@ pub(super) fn listed(names: &[String]) -> String {
     shown_names.join(", ")
 }
 
-/// Decides what the columns of a sheet are: by the user's word, else by their names.
-pub(super) fn roles(sheet: &Sheet, role: FileRole, options: &Options) -> Result<Roles, DatasetError> {
-    let mut roles = Roles::default();
-    let mut given: Vec<(Quantity, usize, Option<Unit>)> = Vec::new();
+/// The columns that the user names, each with its unit where that is said.
+fn given_columns(sheet: &Sheet, role: FileRole, options: &Options) -> Vec<(Quantity, usize, Option<Unit>)> {
+    let mut given = Vec::new();
     for MapEntry { role: of, quantity, column, unit } in &options.map {
         if role.reads(*quantity) && (*of == FileRole::Any || *of == role) {
             given.extend(mapped(sheet, column).map(|index| (*quantity, index, *unit)));
         }
     }
-    if let Some(index) = options.runs_by.as_ref().and_then(|column| mapped(sheet, column)) {
-        given.push((Quantity::Run, index, None));
-    }
+    let run = options.runs_by.as_ref().and_then(|column| mapped(sheet, column));
+    given.extend(run.map(|index| (Quantity::Run, index, None)));
+    given
+}
+
+/// Decides what the columns of a sheet are: by the user's word, else by their names.
+pub(super) fn roles(sheet: &Sheet, role: FileRole, options: &Options) -> Result<Roles, DatasetError> {
+    let mut roles = Roles::default();
+    let given = given_columns(sheet, role, options);
     if sheet.header_line.is_none() && given.is_empty() {
         return Err(without_header(sheet, role));
     }
@@ -157,18 +159,7 @@ pub(super) fn roles(sheet: &Sheet, role: FileRole, options: &Options) -> Result<
             _ => roles.left_out.push(sheet.names[index].clone()),
         }
     }
-    if let Some(stamps) = by_name.get_mut(&Quantity::Time)
-        && let Some((seconds, nanos)) = seconds_and_nanoseconds(sheet, stamps)
-    {
-        let taken = stamps.extract_if(.., |(index, _)| *index == nanos).next();
-        let best = stamps.iter().map(|(_, reading)| reading.rank).max().unwrap_or(0);
-        let is_best = |of: &(usize, NameReading)| of.0 == seconds && of.1.rank == best;
-        if stamps.iter().any(is_best) {
-            by_name.entry(Quantity::Nanoseconds).or_default().extend(taken);
-        } else {
-            roles.left_out.push(sheet.names[nanos].clone());
-        }
-    }
+    take_nanoseconds(sheet, &mut by_name, &mut roles.left_out);
     // A wheel is logged in one form: the one that both columns have.
     let rank_of = |quantity| by_name.get(&quantity).and_then(|all| all.iter().map(|(_, reading)| reading.rank).max());
     let wheel_rank = rank_of(Quantity::Left).zip(rank_of(Quantity::Right)).map(|(left, right)| left.min(right));
@@ -260,6 +251,24 @@ fn is_needed(quantity: Quantity, roles: &Roles) -> bool {
     }
 }
 
+/// Takes the nanoseconds out of the columns of time: for what they are, or, where the seconds next to them are
+/// not the time, among what is left out.
+fn take_nanoseconds(
+    sheet: &Sheet,
+    by_name: &mut BTreeMap<Quantity, Vec<(usize, NameReading)>>,
+    left_out: &mut Vec<String>,
+) {
+    let Some(stamps) = by_name.get_mut(&Quantity::Time) else { return };
+    let Some((seconds, nanos)) = seconds_and_nanoseconds(sheet, stamps) else { return };
+    let taken = stamps.extract_if(.., |(index, _)| *index == nanos).next();
+    let best = stamps.iter().map(|(_, reading)| reading.rank).max().unwrap_or(0);
+    if stamps.iter().any(|(index, reading)| *index == seconds && reading.rank == best) {
+        by_name.entry(Quantity::Nanoseconds).or_default().extend(taken);
+    } else {
+        left_out.push(sheet.names[nanos].clone());
+    }
+}
+
 /// Of columns of time the two that are whole seconds and the nanoseconds beside them, as messages of ROS are
 /// written field by field: `sec`, `nanosec`.
 fn seconds_and_nanoseconds(sheet: &Sheet, stamps: &[(usize, NameReading)]) -> Option<(usize, usize)> {
@@ -320,11 +329,7 @@ fn settle(sheet: &Sheet, role: FileRole, mut roles: Roles) -> Result<Roles, Data
                 "no columns of wheels, left and right or v and omega; the columns are: {}; say which with --map left=COLUMN,right=COLUMN",
                 listed(&sheet.names)
             );
-            return Err(DatasetError::Foreign {
-                file: sheet.file.clone(),
-                line: sheet.header_line.unwrap_or(1),
-                message,
-            });
+            return Err(sheet.foreign_header(message));
         }
         FileRole::Truth if !roles.has_pose() => return Err(lacking(sheet, "x, y", "--truth: it has no poses")),
         _ if !roles.has_wheels() && !roles.has_pose() && !roles.has(Gyro) => {
@@ -341,15 +346,11 @@ fn settle(sheet: &Sheet, role: FileRole, mut roles: Roles) -> Result<Roles, Data
         let name = &sheet.names[chosen.index];
         if let Some(unit) = unreadable_unit(name, |unit| quantity.accepts(unit)) {
             let key = quantity.key();
-            return Err(DatasetError::Foreign {
-                file: sheet.file.clone(),
-                line: sheet.header_line.unwrap_or(1),
-                message: format!(
-                    "column \"{}\" is taken as {key}, which is never read in \"{}\"; say in which unit it is with --map {key}=COLUMN[UNIT]",
-                    shown(name.as_bytes()),
-                    shown(unit.as_bytes()),
-                ),
-            });
+            return Err(sheet.foreign_header(format!(
+                "column \"{}\" is taken as {key}, which is never read in \"{}\"; say in which unit it is with --map {key}=COLUMN[UNIT]",
+                shown(name.as_bytes()),
+                shown(unit.as_bytes()),
+            )));
         }
     }
     Ok(roles)
@@ -382,14 +383,10 @@ fn take_yaw_rate_for_gyro(sheet: &Sheet, roles: &mut Roles) {
 
 fn lacking(sheet: &Sheet, missing: &str, why: &str) -> DatasetError {
     let example = missing.split(", ").next().unwrap_or(missing);
-    DatasetError::Foreign {
-        file: sheet.file.clone(),
-        line: sheet.header_line.unwrap_or(1),
-        message: format!(
-            "no column is known as {missing}: {why}; the columns are: {}; say which with --map {example}=COLUMN",
-            listed(&sheet.names)
-        ),
-    }
+    sheet.foreign_header(format!(
+        "no column is known as {missing}: {why}; the columns are: {}; say which with --map {example}=COLUMN",
+        listed(&sheet.names)
+    ))
 }
 
 fn without_header(sheet: &Sheet, role: FileRole) -> DatasetError {
@@ -401,16 +398,13 @@ fn without_header(sheet: &Sheet, role: FileRole) -> DatasetError {
     };
     let usual: Vec<&str> = usual.into_iter().filter(|entry| !entry.is_empty()).collect();
     let most = usual.len();
-    DatasetError::Foreign {
-        file: sheet.file.clone(),
-        line: sheet.first_row,
-        message: format!(
-            "no header says what the {} columns are; the first row is {}; say it by the columns' numbers, like --map {}",
-            sheet.names.len(),
-            shown(first.as_bytes()),
-            usual[..sheet.names.len().clamp(3, most)].join(",")
-        ),
-    }
+    let message = format!(
+        "no header says what the {} columns are; the first row is {}; say it by the columns' numbers, like --map {}",
+        sheet.names.len(),
+        shown(first.as_bytes()),
+        usual[..sheet.names.len().clamp(3, most)].join(",")
+    );
+    sheet.foreign(sheet.first_row, message)
 }
 
 /// A unit that is said or named, or all that it may be.

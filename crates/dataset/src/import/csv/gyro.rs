@@ -90,10 +90,9 @@ fn refused(
     is_needed: bool,
     remarks: &mut Vec<String>,
 ) -> Result<Option<(Unit, Basis)>, DatasetError> {
-    let file = part.sheet.file.clone();
     if is_needed {
-        return Err(DatasetError::Foreign { file, line: part.sheet.header_line.unwrap_or(1), message });
+        return Err(part.sheet.foreign_header(message));
     }
-    remarks.push(format!("{}: {message}; the gyroscope is left out", file.display()));
+    remarks.push(format!("{}: {message}; the gyroscope is left out", part.sheet.file.display()));
     Ok(None)
 }

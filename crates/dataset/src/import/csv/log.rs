@@ -42,6 +42,41 @@ pub(super) struct PoseColumns {
     pub(super) theta: Vec<f64>,
 }
 
+/// One row of a sheet.
+struct Row<'a> {
+    sheet: &'a Sheet,
+    line: u64,
+    fields: &'a [&'a str],
+}
+
+impl Row<'_> {
+    /// A cell that is no number, or the one that it is, which must not be there.
+    fn fault(&self, column: usize, found: Option<f64>) -> DatasetError {
+        let (file, line) = (self.sheet.file.clone(), self.line);
+        let (column, found_text) = (self.sheet.names[column].clone(), shown(self.fields[column].as_bytes()));
+        if found.is_some() {
+            DatasetError::NotFinite { file, line, column, found: found_text }
+        } else {
+            DatasetError::NotANumber { file, line, column, found: found_text }
+        }
+    }
+
+    /// NaN of an empty cell.
+    fn number(&self, column: usize) -> Result<f64, DatasetError> {
+        match self.fields[column] {
+            "" => Ok(f64::NAN),
+            text => self.sheet.decimal.number(text).ok_or_else(|| self.fault(column, None)),
+        }
+    }
+
+    /// A number in units of 10⁻¹² of the column's.
+    fn exact(&self, column: usize) -> Result<i128, DatasetError> {
+        let decimal = self.sheet.decimal;
+        let found = decimal.exact(self.fields[column]);
+        found.ok_or_else(|| self.fault(column, decimal.number(self.fields[column])))
+    }
+}
+
 impl Log {
     pub(super) fn read(sheet: &Sheet, roles: &Roles) -> Result<Self, DatasetError> {
         let index = |quantity: Quantity| roles.of.get(&quantity).map(|chosen| chosen.index);
@@ -63,32 +98,16 @@ impl Log {
         };
         let mut known: HashMap<&str, u32> = HashMap::new();
         sheet.for_each_row(|line, fields| {
-            let fault = |column: usize, found: Option<f64>| {
-                let (file, found_text) = (sheet.file.clone(), shown(fields[column].as_bytes()));
-                let column = sheet.names[column].clone();
-                if found.is_some() {
-                    DatasetError::NotFinite { file, line, column, found: found_text }
-                } else {
-                    DatasetError::NotANumber { file, line, column, found: found_text }
-                }
-            };
-            let number = |column: usize| match fields[column] {
-                "" => Ok(f64::NAN),
-                text => sheet.decimal.number(text).ok_or_else(|| fault(column, None)),
-            };
-            let exact = |column: usize| {
-                let found = sheet.decimal.exact(fields[column]);
-                found.ok_or_else(|| fault(column, sheet.decimal.number(fields[column])))
-            };
+            let row = Row { sheet, line, fields };
             // The first row says whether times are dates.
             let dated = if log.lines.is_empty() || log.is_dated { text::date_and_time(fields[time]) } else { None };
             log.is_dated |= dated.is_some();
             let stamp = match dated {
                 Some(stamp) => stamp,
-                None if log.is_dated => return Err(fault(time, None)),
-                None => exact(time)?,
+                None if log.is_dated => return Err(row.fault(time, None)),
+                None => row.exact(time)?,
             };
-            let stamp = nanos.map_or(Ok(stamp), |nanos| Ok(stamp + exact(nanos)? / NANOS))?;
+            let stamp = nanos.map_or(Ok(stamp), |nanos| Ok(stamp + row.exact(nanos)? / NANOS))?;
             log.lines.push(line);
             log.time.push(stamp);
             if let Some(run) = run {
@@ -104,23 +123,23 @@ impl Log {
             }
             if let (Some(columns), Some(wheels)) = (wheels, &mut log.wheels) {
                 for (column, values) in columns.into_iter().zip(wheels) {
-                    let value = number(column)?;
+                    let value = row.number(column)?;
                     if !value.is_finite() && !fields[column].is_empty() {
-                        return Err(fault(column, Some(value)));
+                        return Err(row.fault(column, Some(value)));
                     }
                     values.push(value);
                 }
             }
             if let (Some(column), Some(rates)) = (gyro, &mut log.gyro) {
-                rates.push(number(column)?);
+                rates.push(row.number(column)?);
             }
             if let (Some((x, y)), Some(pose)) = (position, &mut log.pose) {
-                pose.x.push(number(x)?);
-                pose.y.push(number(y)?);
+                pose.x.push(row.number(x)?);
+                pose.y.push(row.number(y)?);
                 let theta = match (heading, quaternion) {
-                    (Some(heading), _) => number(heading)?,
+                    (Some(heading), _) => row.number(heading)?,
                     (None, [Some(x), Some(y), Some(z), Some(w)]) => {
-                        let parts = [number(x)?, number(y)?, number(z)?, number(w)?];
+                        let parts = [row.number(x)?, row.number(y)?, row.number(z)?, row.number(w)?];
                         Quaternion::new(parts).map_or(f64::NAN, Quaternion::yaw_rad)
                     }
                     _ => f64::NAN,

@@ -132,15 +132,14 @@ fn dataset(
 
 /// Wheels must be there, and an instrument; what a user should read where it sees no poses.
 fn refuse_halves(parts: &[Part], options: &Options) -> Result<Option<String>, DatasetError> {
-    let file = parts[0].sheet.file.clone();
-    let line = parts[0].sheet.header_line.unwrap_or(1);
-    let columns = || columns::listed(&parts[0].sheet.names);
+    let sheet = &parts[0].sheet;
+    let columns = || columns::listed(&sheet.names);
     if !parts.iter().any(|part| part.roles.has_wheels()) {
         let message = format!(
             "no columns of wheels, left and right or v and omega; the columns are: {}; say which with --map left=COLUMN,right=COLUMN, or give the odometry's file too",
             columns()
         );
-        return Err(DatasetError::Foreign { file, line, message });
+        return Err(sheet.foreign_header(message));
     }
     if parts.iter().any(|part| part.roles.has_pose()) {
         return Ok(None);
@@ -151,7 +150,7 @@ fn refuse_halves(parts: &[Part], options: &Options) -> Result<Option<String>, Da
                 "no poses of an outside instrument; the robot's own odometry does not count; the columns are: {}; say which with --map x=COLUMN,y=COLUMN, or give the truth's file too, by --truth FILE; without poses a gyroscope (--map gyro=COLUMN) or a tape (--tape) is needed",
                 columns()
             );
-            return Err(DatasetError::Foreign { file, line, message });
+            return Err(sheet.foreign_header(message));
         }
         (true, false) => "a gyroscope alone: it determines the wheel separation relative to the wheels, and no length",
         (false, true) => "a tape alone: it determines the wheel diameters, and not the wheel separation",
@@ -222,7 +221,7 @@ fn shift_poses(parts: &mut [Part], options: &Options) -> Result<Option<f64>, Dat
     };
     if !parts.iter().any(|part| part.roles.has_pose()) || offset_s.is_nan() || offset_s.abs() > MAX_OFFSET_S {
         let message = format!("--pose-offset {offset_s}: there are no poses, or this is no offset of clocks");
-        return Err(DatasetError::Foreign { file: parts[0].sheet.file.clone(), line: 1, message });
+        return Err(parts[0].sheet.foreign(1, message));
     }
     for part in parts.iter_mut().filter(|part| part.roles.has_pose() && !part.roles.has_wheels()) {
         part.shift_ps = (offset_s * EXACT_SCALE).round() as i128;

@@ -53,26 +53,7 @@ struct Motions {
 pub fn read_motions(odometry: &Path, truth: &Path, options: &MotionOptions) -> Result<FromCsv, DatasetError> {
     let (by_wheels, by_instrument) = (motions(odometry, options)?, motions(truth, options)?);
     let (robot, geometry) = options.robot.nominal(false, odometry, || "relative motions".to_owned())?;
-    let foreign =
-        |file: &Path, line: u64, message: String| DatasetError::Foreign { file: file.to_owned(), line, message };
-    if by_wheels.rows.len() != by_instrument.rows.len() {
-        let message = format!(
-            "{} motions, and {} has {}; expected pairs, row by row",
-            by_instrument.rows.len(),
-            odometry.display(),
-            by_wheels.rows.len()
-        );
-        return Err(foreign(truth, by_instrument.sheet.first_row, message));
-    }
-    let way = |motions: &Motions| motions.rows.iter().map(|[x, y, _]| x.hypot(*y)).sum::<f64>();
-    let ratio = way(&by_instrument) / way(&by_wheels);
-    if !(1.0 / MAX_RATIO..=MAX_RATIO).contains(&ratio) {
-        let message = format!(
-            "its motions are {ratio:.3} times as long as those of {}; are both of one drive, in one unit (--length-unit), and relative, not poses?",
-            odometry.display()
-        );
-        return Err(foreign(truth, by_instrument.sheet.first_row, message));
-    }
+    refuse_unpaired(&by_wheels, &by_instrument)?;
     let (mut t_s, mut angles) = (vec![0.0], Wheels { left: vec![0.0], right: vec![0.0] });
     let (mut displacements, mut sideways_m2, mut moved_m2) = (Vec::new(), 0.0, 0.0);
     let mut total = Wheels::both(0.0);
@@ -96,7 +77,7 @@ pub fn read_motions(odometry: &Path, truth: &Path, options: &MotionOptions) -> R
         };
         if t1_s.partial_cmp(&t0_s) != Some(std::cmp::Ordering::Greater) {
             let message = format!("a motion that ends at {t1_s} s and begins at {t0_s} s");
-            return Err(foreign(odometry, by_wheels.lines[row], message));
+            return Err(by_wheels.sheet.foreign(by_wheels.lines[row], message));
         }
         t_s.push(t1_s);
         angles.left.push(total.left);
@@ -142,16 +123,39 @@ pub fn read_motions(odometry: &Path, truth: &Path, options: &MotionOptions) -> R
     Ok(FromCsv { imported: Imported { name, dataset, warnings: Vec::new() }, took, truth_shift_s: None })
 }
 
+/// Refuses motions that are not those of one drive, row by row.
+fn refuse_unpaired(by_wheels: &Motions, by_instrument: &Motions) -> Result<(), DatasetError> {
+    let foreign = |message: String| by_instrument.sheet.foreign(by_instrument.sheet.first_row, message);
+    if by_wheels.rows.len() != by_instrument.rows.len() {
+        let message = format!(
+            "{} motions, and {} has {}; expected pairs, row by row",
+            by_instrument.rows.len(),
+            by_wheels.sheet.file.display(),
+            by_wheels.rows.len()
+        );
+        return Err(foreign(message));
+    }
+    let way = |motions: &Motions| motions.rows.iter().map(|[x, y, _]| x.hypot(*y)).sum::<f64>();
+    let ratio = way(by_instrument) / way(by_wheels);
+    if !(1.0 / MAX_RATIO..=MAX_RATIO).contains(&ratio) {
+        let message = format!(
+            "its motions are {ratio:.3} times as long as those of {}; are both of one drive, in one unit (--length-unit), and relative, not poses?",
+            by_wheels.sheet.file.display()
+        );
+        return Err(foreign(message));
+    }
+    Ok(())
+}
+
 /// Motion sideways over motion, root mean squares, from which on it is remarked, as of trajectories.
 const REMARKED_SIDEWAYS: f64 = 0.05;
 
 fn motions(file: &Path, options: &MotionOptions) -> Result<Motions, DatasetError> {
     let sheet = Sheet::open(file, Writing::default())?;
-    let foreign = |line: u64, message: String| DatasetError::Foreign { file: file.to_owned(), line, message };
     let first = match sheet.names.len() {
         3 => 0,
         4 => 1,
-        columns => return Err(foreign(sheet.first_row, format!("{columns} columns; expected {EXPECTED}"))),
+        columns => return Err(sheet.foreign(sheet.first_row, format!("{columns} columns; expected {EXPECTED}"))),
     };
     let (mut times_s, mut lines, mut rows) = (Vec::new(), Vec::new(), Vec::new());
     sheet.for_each_row(|line, fields| {
@@ -159,7 +163,7 @@ fn motions(file: &Path, options: &MotionOptions) -> Result<Motions, DatasetError
         for (value, text) in row.iter_mut().zip(fields) {
             let found = sheet.decimal.number(text).filter(|value| value.is_finite());
             *value = found.ok_or_else(|| {
-                foreign(line, format!("\"{}\" is no number; expected {EXPECTED}", shown(text.as_bytes())))
+                sheet.foreign(line, format!("\"{}\" is no number; expected {EXPECTED}", shown(text.as_bytes())))
             })?;
         }
         times_s.push(row[0]);
@@ -169,7 +173,7 @@ fn motions(file: &Path, options: &MotionOptions) -> Result<Motions, DatasetError
         Ok(())
     })?;
     if rows.len() < 2 {
-        return Err(foreign(sheet.first_row, format!("{} motions; expected at least two", rows.len())));
+        return Err(sheet.foreign(sheet.first_row, format!("{} motions; expected at least two", rows.len())));
     }
     Ok(Motions { sheet, times_s: (first == 1).then_some(times_s), lines, rows })
 }

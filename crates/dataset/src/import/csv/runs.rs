@@ -96,7 +96,7 @@ pub(super) fn runs(
         ordered_by = format!("{ordered_by}, cut at standstills and gaps of more than {cut_s} s");
         if runs.is_empty() {
             let message = format!("--cut {cut_s}: no run is left that moves; say a longer time");
-            return Err(DatasetError::Foreign { file: parts[with_wheels[0]].sheet.file.clone(), line: 1, message });
+            return Err(parts[with_wheels[0]].sheet.foreign(1, message));
         }
     }
     in_time_order(parts, &runs)?;
@@ -193,12 +193,11 @@ fn between<'r>(by_time: &'r [usize], time: &[i128], (from, to): (i128, i128)) ->
 /// Two files whose times do not meet have two clocks.
 fn refuse_other_clock(parts: &[Part], run: &RawRun, from: i128, to: i128) -> Result<(), DatasetError> {
     let truth = &parts[run.truth_part];
-    let file = truth.sheet.file.clone();
-    let line = truth.sheet.first_row;
+    let refused = |message: String| Err(truth.sheet.foreign(truth.sheet.first_row, message));
     let ends = run.truth_rows.first().zip(run.truth_rows.last());
     let Some((&first, &last)) = ends else {
         let message = format!("no row has a pose of run \"{}\"; every run needs a truth", run.id);
-        return Err(DatasetError::Foreign { file, line, message });
+        return refused(message);
     };
     let (first, last) = (truth.log.time[first], truth.log.time[last]);
     if first <= to && last >= from {
@@ -212,7 +211,7 @@ fn refuse_other_clock(parts: &[Part], run: &RawRun, from: i128, to: i128) -> Res
         of(from, to),
         seconds(from, first)
     );
-    Err(DatasetError::Foreign { file, line, message })
+    refused(message)
 }
 
 /// Of rows of one instant that are few the first is kept: a logger that writes a line twice, or two that were

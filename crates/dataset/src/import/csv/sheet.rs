@@ -206,6 +206,16 @@ impl Sheet {
         }
     }
 
+    /// A line that is none of such a table.
+    pub(super) fn foreign(&self, line: u64, message: String) -> DatasetError {
+        DatasetError::Foreign { file: self.file.clone(), line, message }
+    }
+
+    /// A header that is none of such a table.
+    pub(super) fn foreign_header(&self, message: String) -> DatasetError {
+        self.foreign(self.header_line.unwrap_or(1), message)
+    }
+
     /// The first cells of a column as they are written.
     pub(super) fn first_cells(&self, column: usize) -> Vec<String> {
         const SHOWN: usize = 3;

@@ -198,11 +198,7 @@ fn odometry(file: &Path, remarks: &mut Vec<String>) -> Result<Part, DatasetError
     let poses = log.pose.take().unwrap_or_default();
     if poses.theta.iter().any(|theta| !theta.is_finite()) {
         let message = "poses without a heading say nothing of how the robot turned; give its wheels by --wheels";
-        return Err(DatasetError::Foreign {
-            file: file.to_owned(),
-            line: sheet.first_row,
-            message: message.to_owned(),
-        });
+        return Err(sheet.foreign(sheet.first_row, message.to_owned()));
     }
     let pose = |row: usize| Pose::new(poses.x[row], poses.y[row], poses.theta[row]);
     let (mut speeds, mut yaw_rates) = (vec![0.0], vec![0.0]);
