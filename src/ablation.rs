@@ -16,6 +16,7 @@ pub(crate) struct Ablation {
     off: Vec<Rule>,
     decisions: Option<PathBuf>,
     preflight: preflight::settings::Settings,
+    estimation: estimation::settings::Settings,
     diagnose: diagnose::settings::Settings,
 }
 
@@ -26,6 +27,7 @@ impl Ablation {
         let ablation: Self = toml::from_str(&read_text(file)?).map_err(unreadable)?;
         rules::switch_off(ablation.off.iter().copied())?;
         preflight::settings::install(ablation.preflight.clone())?;
+        estimation::settings::install(ablation.estimation.clone())?;
         diagnose::settings::install(ablation.diagnose.clone())?;
         Ok(ablation)
     }

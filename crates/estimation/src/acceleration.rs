@@ -7,10 +7,7 @@ use std::collections::VecDeque;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::settings::{
-    ANDERSON_DEPTH, ANDERSON_DIVERGED_MEAN_STEP, ANDERSON_DIVERGED_NOISE_STEP, ANDERSON_MEAN_STEP, ANDERSON_NOISE_STEP,
-    ANDERSON_SINGULAR_VALUE, MAX_ANDERSON_DIVERGENCES, MAX_ANDERSON_STEP_RATIO,
-};
+use crate::settings::COMMON;
 
 /// Size of a step: of the mean squared over its variance, and of the noise in the logarithm of a variance.
 #[derive(Debug, Clone, Copy)]
@@ -33,14 +30,16 @@ pub(super) struct Acceleration {
 impl Acceleration {
     /// Whether the next step, of this size, is to be mixed.
     pub(super) fn engages(&mut self, step: StepSize) -> bool {
-        if self.engaged && (step.mean > ANDERSON_DIVERGED_MEAN_STEP || step.noise > ANDERSON_DIVERGED_NOISE_STEP) {
+        if self.engaged
+            && (step.mean > COMMON.anderson_diverged_mean_step || step.noise > COMMON.anderson_diverged_noise_step)
+        {
             (self.engaged, self.last) = (false, None);
             self.differences.clear();
             self.diverged += 1;
         }
-        self.engaged |= step.mean < ANDERSON_MEAN_STEP
-            && step.noise < ANDERSON_NOISE_STEP
-            && self.diverged < MAX_ANDERSON_DIVERGENCES;
+        self.engaged |= step.mean < COMMON.anderson_mean_step
+            && step.noise < COMMON.anderson_noise_step
+            && self.diverged < COMMON.max_anderson_divergences;
         self.engaged
     }
 
@@ -51,7 +50,7 @@ impl Acceleration {
         if let Some((before, moved)) = self.last.take() {
             self.differences.push_back((step - before, moved));
         }
-        if self.differences.len() > ANDERSON_DEPTH {
+        if self.differences.len() > COMMON.anderson_depth {
             self.differences.pop_front();
         }
         if self.differences.is_empty() {
@@ -67,7 +66,7 @@ impl Acceleration {
             self.differences.clear();
             return step.clone();
         }
-        let least = ANDERSON_SINGULAR_VALUE * products.diagonal().max();
+        let least = COMMON.anderson_singular_value * products.diagonal().max();
         let Ok(shares) = products.svd(true, true).solve(&along, least) else { return step.clone() };
         let combined = self
             .differences
@@ -75,7 +74,7 @@ impl Acceleration {
             .zip(shares.iter())
             .fold(step.clone(), |sum, ((difference, moved), share)| sum - (difference + moved) * *share);
         if combined.iter().all(|by| by.is_finite())
-            && squared(&combined) <= MAX_ANDERSON_STEP_RATIO * MAX_ANDERSON_STEP_RATIO * squared(step)
+            && squared(&combined) <= COMMON.max_anderson_step_ratio * COMMON.max_anderson_step_ratio * squared(step)
         {
             combined
         } else {

@@ -20,7 +20,7 @@ use crate::pass_options::{OutlierGate, PassOptions};
 use crate::propagation::{CarriedState, Propagator};
 use crate::segment::{MeasuredPose, Segment};
 use crate::sensor_heading::start_heading;
-use crate::settings::{HEADING_STEP_TOLERANCE_RAD, MAX_DECIMATION_NONCENTRALITY, MAX_UNGATED_STEPS, MIN_NOISE_SIGMA};
+use crate::settings::{COMMON, START_HEADINGS};
 use crate::thinning::Selection;
 use crate::wheel_angles::WheelInterval;
 
@@ -88,9 +88,12 @@ impl ModelFit<'_> {
             let settled = |mut headings: Vec<f64>, gate: OutlierGate| {
                 let pass_options = PassOptions { gate, ..pass_options };
                 let mut found = pass(&self.records, own, model, noise, &headings, terms, pass_options);
-                for _ in 0..MAX_UNGATED_STEPS {
+                for _ in 0..COMMON.max_ungated_steps {
                     let heads = &found.headings;
-                    if heads.iter().all(|heading| heading.response.rest.abs() < HEADING_STEP_TOLERANCE_RAD) {
+                    if heads
+                        .iter()
+                        .all(|heading| heading.response.rest.abs() < START_HEADINGS.heading_step_tolerance_rad)
+                    {
                         break;
                     }
                     heads.iter().for_each(|heading| headings[heading.segment] += heading.response.rest);
@@ -126,7 +129,7 @@ impl ModelFit<'_> {
         let same_measurements = both.clone().all(|(run, own)| run.count == own.count);
         // A run's χ² changes by 2 Σ z δ, which has the variance 4 Σ δ².
         let squares: f64 = both.map(|(run, own)| (0.5 * (run.chi_square - own.chi_square)).powi(2)).sum();
-        (same_measurements && squares < MAX_DECIMATION_NONCENTRALITY).then_some(decimated)
+        (same_measurements && squares < COMMON.max_decimation_noncentrality).then_some(decimated)
     }
 
     /// Mahalanobis distance of consecutive displacements, composed, from dead reckoning with the geometry
@@ -162,7 +165,7 @@ impl ModelFit<'_> {
         let mut without = Self { prior: self.prior.without(component), ..self.clone() };
         let mut from = self.current_values();
         from.noise = from.noise.map(|mut noise| {
-            noise.variance[component as usize] = MIN_NOISE_SIGMA * MIN_NOISE_SIGMA;
+            noise.variance[component as usize] = COMMON.min_noise_sigma * COMMON.min_noise_sigma;
             noise
         });
         without.refit(Some(from), terms)?;

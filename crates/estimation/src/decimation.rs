@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use crate::records::Records;
 use crate::segment::{MeasuredPose, Segment};
-use crate::settings::{MIN_DECIMATION, STEP_LENGTH_TOLERANCE};
+use crate::settings::{COMMON, STEP_LENGTH_TOLERANCE};
 use crate::thinning::{PropagationInterval, Selection};
 use crate::wheel_angles::WheelInterval;
 
@@ -26,7 +26,7 @@ impl<'a> Decimated<'a> {
         let intervals = |segments: &[Segment<'_>]| segments.iter().map(|of| of.intervals.len()).sum::<usize>();
         let joined = records.segments.par_iter().map(|segment| join_intervals(segment, longest_s));
         let (segments, ends): (Vec<Segment<'a>>, Vec<Vec<usize>>) = joined.unzip();
-        if intervals(&segments) > intervals(&records.segments) / MIN_DECIMATION {
+        if intervals(&segments) > intervals(&records.segments) / COMMON.min_decimation {
             return None;
         }
         let of_segment = |(propagations, ends): (&Vec<PropagationInterval>, &Vec<usize>)| {

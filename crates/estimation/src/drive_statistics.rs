@@ -5,7 +5,7 @@ use kinematics::Wheels;
 use crate::model::Model;
 use crate::records::Records;
 use crate::segment::Segment;
-use crate::settings::{CRUISE_QUANTILE, RISE_QUANTILE, RISE_SPEED_RATIOS};
+use crate::settings::DRIVING;
 use crate::wheel_angles::WheelInterval;
 
 /// How the faster wheel was driven.
@@ -33,10 +33,10 @@ impl Records<'_> {
         let partial = self.partial.iter().map(|partial| &partial.segment);
         let runs: Vec<Vec<RowSpeed>> = self.segments.iter().chain(partial).map(|of| row_speeds(of, model)).collect();
         let moving = runs.iter().flatten().filter(|row| row.speed_m_s > 0.0);
-        let cruise_speed_m_s = weighted_quantile(moving.map(|row| (row.speed_m_s, row.dt_s)), CRUISE_QUANTILE)?;
+        let cruise_speed_m_s = weighted_quantile(moving.map(|row| (row.speed_m_s, row.dt_s)), DRIVING.cruise_quantile)?;
         let rises_s = runs.iter().flat_map(|run| rise_times_s(run, cruise_speed_m_s));
-        let rise_s = weighted_quantile(rises_s.map(|rise_s| (rise_s, 1.0)), RISE_QUANTILE);
-        let [low, high] = RISE_SPEED_RATIOS;
+        let rise_s = weighted_quantile(rises_s.map(|rise_s| (rise_s, 1.0)), DRIVING.rise_quantile);
+        let [low, high] = DRIVING.rise_speed_ratios;
         let acceleration_m_s2 = rise_s.map(|rise_s| (high - low) * cruise_speed_m_s / rise_s);
         Some(DriveStatistics { cruise_speed_m_s, acceleration_m_s2 })
     }
@@ -59,7 +59,7 @@ fn row_speeds(segment: &Segment<'_>, model: &Model) -> Vec<RowSpeed> {
 /// Times from a tenth of a speed to nine tenths of it, without slowing down to a tenth in between, seconds:
 /// linear between the middles of rows.
 fn rise_times_s(rows: &[RowSpeed], cruise_speed_m_s: f64) -> Vec<f64> {
-    let [low_m_s, high_m_s] = RISE_SPEED_RATIOS.map(|ratio| ratio * cruise_speed_m_s);
+    let [low_m_s, high_m_s] = DRIVING.rise_speed_ratios.map(|ratio| ratio * cruise_speed_m_s);
     let mut rises_s = Vec::new();
     let mut low_s = None;
     for pair in rows.windows(2) {

@@ -24,7 +24,7 @@ use crate::products::{Products, Sums};
 use crate::propagation::{CarriedState, Moved, PropagationSource, Propagator, SegmentCache, turned_by};
 use crate::rounding::Rounding;
 use crate::segment::{MeasuredPose, Segment, Start};
-use crate::settings::{OUTLIER_CHI_SQUARE, RESTART_AFTER_OUTLIERS};
+use crate::settings::COMMON;
 use crate::thinning::PropagationInterval;
 
 /// The filter of one segment.
@@ -100,7 +100,7 @@ impl Kernel for FilterRun<'_, '_, '_> {
             filter.outliers.push(propagation.measurement);
             rejected_in_a_row += 1;
             // Without a heading the filter cannot start in the middle of a segment.
-            let restarts = rejected_in_a_row >= RESTART_AFTER_OUTLIERS
+            let restarts = rejected_in_a_row >= COMMON.restart_after_outliers
                 && filter.segment.measurements[propagation.measurement].theta_rad.is_some()
                 && filter.segment.start == Start::MeasuredPose;
             if rules::Rule::RestartAfterOutliers.applies(restarts) {
@@ -422,7 +422,8 @@ impl<'f, 'a> Filter<'f, 'a> {
             covariance.lower(&gain, &ph);
             *update = Update { row, gain, v, s };
         }
-        if rules::Rule::OutlierGate.applies(self.pass_options.gate == OutlierGate::On && distance > OUTLIER_CHI_SQUARE)
+        if rules::Rule::OutlierGate
+            .applies(self.pass_options.gate == OutlierGate::On && distance > COMMON.outlier_chi_square)
         {
             return false;
         }

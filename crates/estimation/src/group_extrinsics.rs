@@ -11,9 +11,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::model::{Column, GroupExtrinsics, Model};
 use crate::normal_equations::NormalEquations;
-use crate::settings::{
-    EXTRINSICS_PRIOR_SIGMA_M, EXTRINSICS_PRIOR_SIGMA_RAD, LATENCY_PRIOR_SIGMA_S, MAX_POSTERIOR_TO_PRIOR_SIGMA,
-};
+use crate::settings::{COMMON, LATENCY_PRIOR_SIGMA_S};
 
 /// Response of a group's own columns: their own step, and that by each column of the normal equation.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,7 +75,8 @@ impl GroupExtrinsics {
 
     /// Is a column of a group determined better than by its prior?
     pub(crate) fn is_shown(&self, response: &GroupResponse, column: Column) -> bool {
-        self.sigma(response, column).is_some_and(|sigma| sigma < MAX_POSTERIOR_TO_PRIOR_SIGMA * prior_sigma(column))
+        self.sigma(response, column)
+            .is_some_and(|sigma| sigma < COMMON.max_posterior_to_prior_sigma * prior_sigma(column))
     }
 
     /// Standard deviation of a column of a group, the common values given.
@@ -106,10 +105,10 @@ impl GroupExtrinsics {
     }
 }
 
-const fn prior_sigma(column: Column) -> f64 {
+fn prior_sigma(column: Column) -> f64 {
     match column {
-        Column::SensorX | Column::SensorY => EXTRINSICS_PRIOR_SIGMA_M,
-        Column::SensorTheta => EXTRINSICS_PRIOR_SIGMA_RAD,
+        Column::SensorX | Column::SensorY => COMMON.extrinsics_prior_sigma_m,
+        Column::SensorTheta => COMMON.extrinsics_prior_sigma_rad,
         _ => LATENCY_PRIOR_SIGMA_S,
     }
 }

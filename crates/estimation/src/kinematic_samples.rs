@@ -7,7 +7,7 @@
 use kinematics::{Increment, Pose, Side, Wheels};
 
 use crate::model::Model;
-use crate::settings::REVERSAL_M;
+use crate::settings::COMMON;
 use crate::wheel_angles::WheelInterval;
 
 /// How the robot moved between the measurement before and this one, by the counts.
@@ -103,8 +103,8 @@ impl KinematicSampler {
         for side in Side::BOTH {
             self.turned_rad[side] += interval.wheel_rad[side];
         }
-        self.swing_m = (self.swing_m + increment.distance_m).clamp(-0.5 * REVERSAL_M, 0.5 * REVERSAL_M);
-        if self.swing_m.abs() >= 0.5 * REVERSAL_M {
+        self.swing_m = (self.swing_m + increment.distance_m).clamp(-0.5 * COMMON.reversal_m, 0.5 * COMMON.reversal_m);
+        if self.swing_m.abs() >= 0.5 * COMMON.reversal_m {
             let forward = self.swing_m > 0.0;
             if self.forward.is_some_and(|before| before != forward) {
                 self.since_reversal_m = Some(0.0);

@@ -66,7 +66,7 @@ mod segment;
 mod segment_record;
 mod sensor_heading;
 mod sensor_position;
-mod settings;
+pub mod settings;
 mod start;
 mod stated_wheels;
 mod step_control;

@@ -12,9 +12,7 @@ use std::rc::Rc;
 
 use kinematics::sin_cos;
 
-use crate::settings::{
-    GOLDEN_ANGLE_RAD, MAP_CELLS_PER_LENGTH, MAP_WAVES, MAX_MAP_CELLS, MAX_MAP_FUNCTIONS, MAX_MAP_REMAINDER,
-};
+use crate::settings::MAP;
 
 /// One of the functions.
 #[derive(Debug, Clone)]
@@ -62,13 +60,13 @@ pub(crate) fn map_functions(places: impl Iterator<Item = [f64; 2]>, length_m: f6
     (0..columns).map(|column| MapFunction::OfPlaces { factor: Rc::clone(&factor), column }).collect()
 }
 
-/// The factor; `None` where places need more than `MAX_MAP_FUNCTIONS` columns.
+/// The factor; `None` where places need more than `max_map_functions` columns.
 fn factor(places: impl Iterator<Item = [f64; 2]>, length_m: f64) -> Option<Factor> {
-    let cell_m = length_m / MAP_CELLS_PER_LENGTH;
+    let cell_m = length_m / MAP.map_cells_per_length;
     let mut cells: BTreeSet<[i64; 2]> = BTreeSet::new();
     for place in places {
         cells.insert(cell(place, cell_m));
-        if cells.len() > MAX_MAP_CELLS {
+        if cells.len() > MAP.max_map_cells {
             return None;
         }
     }
@@ -80,11 +78,11 @@ fn factor(places: impl Iterator<Item = [f64; 2]>, length_m: f64) -> Option<Facto
     let (mut left, mut factor) = (vec![1.0_f64; cells.len()], vec![Vec::new(); cells.len()]);
     let largest = |left: &[f64]| {
         let pivot = (0..left.len()).max_by(|a, b| left[*a].total_cmp(&left[*b]))?;
-        (left[pivot] > MAX_MAP_REMAINDER).then_some(pivot)
+        (left[pivot] > MAP.max_map_remainder).then_some(pivot)
     };
     while let Some(pivot) = largest(&left) {
         let of_pivot: Vec<f64> = factor[pivot].clone();
-        if of_pivot.len() == MAX_MAP_FUNCTIONS {
+        if of_pivot.len() == MAP.max_map_functions {
             return None;
         }
         let root = left[pivot].sqrt();
@@ -105,15 +103,15 @@ fn factor(places: impl Iterator<Item = [f64; 2]>, length_m: f64) -> Option<Facto
 
 /// Waves at quantiles of the spectrum.
 fn waves(length_m: f64) -> Vec<MapFunction> {
-    let n = f64::from(MAP_WAVES);
+    let n = f64::from(MAP.map_waves);
     let of = |k: u32| {
         // Quantiles of the length of w: Rayleigh over ℓ.
         let length_per_m = (-2.0 * (1.0 - (f64::from(k) + 0.5) / n).ln()).sqrt() / length_m;
-        let (sin, cos) = sin_cos(f64::from(k) * GOLDEN_ANGLE_RAD);
+        let (sin, cos) = sin_cos(f64::from(k) * MAP.golden_angle_rad);
         let per_m = [length_per_m * cos, length_per_m * sin];
         [0.0, 0.25 * TAU].map(|phase_rad| MapFunction::Wave { per_m, phase_rad, amplitude: n.sqrt().recip() })
     };
-    (0..MAP_WAVES).flat_map(of).collect()
+    (0..MAP.map_waves).flat_map(of).collect()
 }
 
 #[cfg(test)]
@@ -155,7 +153,7 @@ mod tests {
         // 40 m × 40 m, a length of 0.5 m: more than are factored.
         let places = (0..6400).map(|k| [0.5 * f64::from(k % 80), 0.5 * f64::from(k / 80)]);
         let functions = map_functions(places, 0.5);
-        assert_eq!(functions.len(), 2 * MAP_WAVES as usize);
+        assert_eq!(functions.len(), 2 * MAP.map_waves as usize);
         let (here, mut worst) = ([3.0, -1.0], 0.0_f64);
         for k in 0..40 {
             let (distance_m, direction_rad) = (0.025 * f64::from(k), 0.7 * f64::from(k));
@@ -237,7 +235,7 @@ mod tests {
             MapFunction::Wave { per_m, phase_rad, amplitude } => (*per_m, *phase_rad, *amplitude),
             MapFunction::OfPlaces { .. } => panic!("no wave"),
         };
-        let n = f64::from(MAP_WAVES);
+        let n = f64::from(MAP.map_waves);
         let (mut squares, mut mixed, mut lengths) = ([0.0; 2], 0.0, Vec::new());
         for pair in all.chunks(2) {
             let [(per_m, start, amplitude), (other, quarter, of_other)] = [of(&pair[0]), of(&pair[1])];

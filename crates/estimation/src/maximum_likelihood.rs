@@ -11,7 +11,7 @@ use crate::model_fit::ModelFit;
 use crate::nuisances::{Explained, add_nuisances, explained_by_nuisances};
 use crate::optimizer::ConvergenceCriterion;
 use crate::pass_options::OutlierGate;
-use crate::settings::{MIN_START_CLOCK_S, NOISE_STEP_TOLERANCE};
+use crate::settings::COMMON;
 
 /// What a fit estimates beside the geometry.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,7 +38,7 @@ impl FitSettings {
     /// # Errors
     /// [`EstimationError`] when the sessions hold no measurements, or the fit diverges.
     pub fn fit<'a>(&self, sessions: &[Session<'a>]) -> Result<ModelFit<'a>, EstimationError> {
-        self.fit_until(ConvergenceCriterion::NoiseShare(NOISE_STEP_TOLERANCE), sessions)
+        self.fit_until(ConvergenceCriterion::NoiseShare(COMMON.noise_step_tolerance), sessions)
     }
 
     /// The same, ended where the likelihood hardly changes any more: to compare models by.
@@ -57,7 +57,7 @@ impl FitSettings {
         let start = StartValues::of(session);
         start.drive?;
         let clock_s = start.clock_offset_s.unwrap_or(0.0);
-        let ends = ConvergenceCriterion::NoiseShare(NOISE_STEP_TOLERANCE);
+        let ends = ConvergenceCriterion::NoiseShare(COMMON.noise_step_tolerance);
         let mut fit = ModelFit::started(std::slice::from_ref(session), &[start], &[clock_s], ends, false).ok()?;
         fit.start.body_from_sensor.theta_rad = fit.records.sensor_heading_rad(&fit.start);
         fit.columns.extend(fit.records.extrinsics());
@@ -75,7 +75,10 @@ impl FitSettings {
         refuse_wrapped_counters(sessions)?;
         let starts: Vec<StartValues> = sessions.par_iter().map(StartValues::of).collect();
         let seen_s = |start: &StartValues| {
-            start.clock_offset_s.filter(|offset_s| self.nuisances && offset_s.abs() >= MIN_START_CLOCK_S).unwrap_or(0.0)
+            start
+                .clock_offset_s
+                .filter(|offset_s| self.nuisances && offset_s.abs() >= COMMON.min_start_clock_s)
+                .unwrap_or(0.0)
         };
         let clock_s: Vec<f64> = starts.iter().map(seen_s).collect();
         let mut found = ModelFit::started(sessions, &starts, &clock_s, ends, self.thin_displacements)?;

@@ -19,10 +19,7 @@ use crate::pass::{Pass, pass};
 use crate::pass_options::{OutlierGate, PassOptions};
 use crate::records::Records;
 use crate::segment::Segment;
-use crate::settings::{
-    DRIVE_PRIOR_SIGMA, MAX_AUTOCORRELATION_LAG, MAX_NOMINAL_DEVIATION, MAX_OBSERVABLE_SIGMA, MIN_NAMED_DIRECTION,
-    MIN_OWN_DIRECTION, MIN_RUNS_TO_HOLD_OUT, MIN_SENSOR_POSITION_CHI_SQUARE, WHITENESS_Z,
-};
+use crate::settings::{COMMON, DRIVE_PRIOR_SIGMA, NUISANCES, START_HEADINGS, WHITENESS_Z};
 use crate::stated_wheels::with_stated_wheels;
 use crate::thinning::{Selection, Thinning};
 
@@ -144,7 +141,10 @@ impl ModelFit<'_> {
         self.start.body_from_sensor = Pose::new(x_m, y_m, self.start.body_from_sensor.theta_rad);
         self.columns.extend(self.records.extrinsics());
         self.refit(None, &mut [])?;
-        if self.sensor_position_chi_square().is_none_or(|chi_square| chi_square < MIN_SENSOR_POSITION_CHI_SQUARE) {
+        if self
+            .sensor_position_chi_square()
+            .is_none_or(|chi_square| chi_square < START_HEADINGS.min_sensor_position_chi_square)
+        {
             *self = centred;
             self.refit(None, &mut [])?;
         }
@@ -225,7 +225,7 @@ impl ModelFit<'_> {
                     for (number, innovation) in series.iter().enumerate() {
                         squares += innovation.z * innovation.z;
                         count += 1.0;
-                        for (lag, before) in (1..=MAX_AUTOCORRELATION_LAG).zip(series[..number].iter().rev()) {
+                        for (lag, before) in (1..=COMMON.max_autocorrelation_lag).zip(series[..number].iter().rev()) {
                             let weight = self.records.weight_of_pair(before.segment, innovation.segment, lag);
                             let counts = self.displacements_in_series || before.segment == innovation.segment;
                             if counts && weight > 0.0 {
@@ -259,13 +259,13 @@ impl ModelFit<'_> {
     /// those of the fit.
     #[must_use]
     pub fn units(&self, terms: &mut [Box<dyn ModelTerm>]) -> Vec<NormalEquations> {
-        if self.solution.pass.runs.len() >= MIN_RUNS_TO_HOLD_OUT {
+        if self.solution.pass.runs.len() >= NUISANCES.min_runs_to_hold_out {
             return self.solution.pass.runs.clone();
         }
         if !self.parts.is_empty() {
             return self.parts.clone();
         }
-        self.in_blocks(terms, MIN_RUNS_TO_HOLD_OUT.div_ceil(self.solution.pass.runs.len().max(1)))
+        self.in_blocks(terms, NUISANCES.min_runs_to_hold_out.div_ceil(self.solution.pass.runs.len().max(1)))
     }
 
     /// Finds the directions of the geometry parameters that the measurements do not determine, and fixes them
@@ -286,7 +286,7 @@ impl ModelFit<'_> {
         let along: Vec<f64> = directions.iter().map(|direction| direction.dot(&moved)).collect();
         let is_fixed = |(direction, along): (&DVector<f64>, &f64)| {
             let within: f64 = self.unobservable.iter().map(|fixed| fixed.dot(direction).powi(2)).sum();
-            within.sqrt() > MIN_NAMED_DIRECTION && along.abs() < MAX_NOMINAL_DEVIATION
+            within.sqrt() > COMMON.min_named_direction && along.abs() < COMMON.max_nominal_deviation
         };
         if directions.len() == self.unobservable.len() && directions.iter().zip(&along).all(is_fixed) {
             return Ok(());
@@ -420,7 +420,7 @@ impl ModelFit<'_> {
 pub(crate) fn unobservable(matrix: &DMatrix<f64>) -> Vec<DVector<f64>> {
     let SymmetricEigen { eigenvalues, eigenvectors } = geometry_information(matrix).symmetric_eigen();
     let directions: Vec<Vector3<f64>> = (0..3)
-        .filter(|&k| eigenvalues[k] < MAX_OBSERVABLE_SIGMA.powi(-2))
+        .filter(|&k| eigenvalues[k] < COMMON.max_observable_sigma.powi(-2))
         .map(|k| eigenvectors.column(k).into_owned())
         .collect();
     disentangled(&directions).into_iter().map(|of| DVector::from_column_slice(of.as_slice())).collect()
@@ -439,7 +439,8 @@ fn disentangled(directions: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
         let inside: Vector3<f64> = within(of);
         let rest = own.iter().fold(inside, |rest, before| rest - before * before.dot(&rest));
         // What is no direction of its own any more is left out; the named ones only where they are inside.
-        let is_own = rest.norm() > if directions.contains(of) { MIN_OWN_DIRECTION } else { MIN_NAMED_DIRECTION };
+        let is_own =
+            rest.norm() > if directions.contains(of) { COMMON.min_own_direction } else { COMMON.min_named_direction };
         if is_own && own.len() < directions.len() {
             own.push(rest.normalize());
         }

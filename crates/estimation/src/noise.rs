@@ -4,10 +4,7 @@
 use dataset::TruthNoise;
 use nalgebra::Matrix4xX;
 
-use crate::settings::{
-    FIXED_NOISE_LOG_SIGMA, HEADING_PRIOR_SIGMA_RAD, MIN_NOISE_SIGMA, NOISE_PRIOR_LOG_SIGMA, POSITION_PRIOR_SIGMA_M,
-    STATED_NOISE_LOG_SIGMA, TURN_PRIOR_SIGMA, WHEEL_PRIOR_SIGMA,
-};
+use crate::settings::COMMON;
 
 /// One of the variances.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,16 +52,17 @@ impl NoisePrior {
     pub(crate) fn of(stated: TruthNoise) -> Self {
         let reused = |sigma: Option<f64>| sigma.filter(|sigma| *sigma > 0.0);
         let (xy, theta) = (reused(stated.sigma_xy_m), reused(stated.sigma_theta_rad));
-        let log_sd =
-            |stated: Option<f64>| if stated.is_some() { STATED_NOISE_LOG_SIGMA } else { NOISE_PRIOR_LOG_SIGMA };
+        let log_sd = |stated: Option<f64>| {
+            if stated.is_some() { COMMON.stated_noise_log_sigma } else { COMMON.noise_prior_log_sigma }
+        };
         Self {
             centre: [
-                WHEEL_PRIOR_SIGMA,
-                TURN_PRIOR_SIGMA,
-                xy.unwrap_or(POSITION_PRIOR_SIGMA_M),
-                theta.unwrap_or(HEADING_PRIOR_SIGMA_RAD),
+                COMMON.wheel_prior_sigma,
+                COMMON.turn_prior_sigma,
+                xy.unwrap_or(COMMON.position_prior_sigma_m),
+                theta.unwrap_or(COMMON.heading_prior_sigma_rad),
             ],
-            log_sd: [NOISE_PRIOR_LOG_SIGMA, NOISE_PRIOR_LOG_SIGMA, log_sd(xy), log_sd(theta)],
+            log_sd: [COMMON.noise_prior_log_sigma, COMMON.noise_prior_log_sigma, log_sd(xy), log_sd(theta)],
             common_scale: false,
             timing_s2: 0.0,
         }
@@ -92,7 +90,8 @@ impl NoisePrior {
 
     /// The same with one standard deviation fixed at its lower bound.
     pub(crate) fn without(mut self, component: NoiseComponent) -> Self {
-        (self.centre[component as usize], self.log_sd[component as usize]) = (MIN_NOISE_SIGMA, FIXED_NOISE_LOG_SIGMA);
+        (self.centre[component as usize], self.log_sd[component as usize]) =
+            (COMMON.min_noise_sigma, COMMON.fixed_noise_log_sigma);
         self
     }
 

@@ -13,10 +13,7 @@ use crate::model_fit::{ModelFit, unobservable};
 use crate::normal_equations::{NormalEquations, total};
 use crate::optimizer::Solution;
 use crate::pass_options::OutlierGate;
-use crate::settings::{
-    BLOCKS_PER_RUN, FOLDS, MAX_END_GROWTH_RATIO, MIN_HELD_OUT_GAIN_SIGMA, MIN_OUTLIER_REDUCTION, MIN_RUNS_TO_HOLD_OUT,
-    MIN_THINNING_REDUCTION,
-};
+use crate::settings::NUISANCES;
 use crate::thinning::Thinning;
 
 /// A run, or a part of one, with the fold that holds it out.
@@ -43,7 +40,7 @@ impl HeldOut {
         // Without headings their errors are 0 in both.
         let growth = |from: f64, to: f64| if from == to { 0.0 } else { to / from - 1.0 };
         let (position, heading) = (growth(base.end_m, self.end_m), growth(base.end_rad, self.end_rad));
-        let grows = |growth: f64, other: f64| growth > 0.0_f64.max(-MAX_END_GROWTH_RATIO * other);
+        let grows = |growth: f64, other: f64| growth > 0.0_f64.max(-NUISANCES.max_end_growth_ratio * other);
         grows(position, heading) || grows(heading, position)
     }
 }
@@ -111,7 +108,7 @@ pub(crate) fn add_nuisances(fit: &mut ModelFit<'_>, gate: OutlierGate) -> Result
             let gains: Vec<f64> = before.costs.iter().zip(&found.costs).map(|(base, set)| base - set).collect();
             let Some((mean, error)) = mean_and_error(&gains) else { continue };
             let drifts = set != &[Column::Latency] && found.drifts_beside(&base);
-            let gains_enough = mean > MIN_HELD_OUT_GAIN_SIGMA * error;
+            let gains_enough = mean > NUISANCES.min_held_out_gain_sigma * error;
             if gains_enough && !Rule::NuisancesDrift.applies(drifts) {
                 let gain = base.costs.iter().zip(&found.costs).map(|(base, set)| base - set).sum();
                 of_grouping = Some(AcceptedNuisances { gain, columns, own, held_out: found });
@@ -195,8 +192,8 @@ pub(crate) fn explained_by_nuisances<'a>(
         explained.thin()?;
     }
     let outliers = |fit: &ModelFit<'_>| fit.solution.pass.outliers.len();
-    let has_fewer_outliers = MIN_OUTLIER_REDUCTION * outliers(&explained) < outliers(&plain);
-    let is_thinned_less = MIN_THINNING_REDUCTION * explained.thinning.every_s < plain.thinning.every_s;
+    let has_fewer_outliers = NUISANCES.min_outlier_reduction * outliers(&explained) < outliers(&plain);
+    let is_thinned_less = NUISANCES.min_thinning_reduction * explained.thinning.every_s < plain.thinning.every_s;
     Ok(if Rule::NuisancesExplain.applies(has_fewer_outliers || is_thinned_less) {
         Explained::Yes(explained)
     } else {
@@ -208,7 +205,7 @@ pub(crate) fn explained_by_nuisances<'a>(
 /// judged on it. `None` when the others of some fold do not determine the columns.
 fn held_out(fit: &ModelFit<'_>, units: &[Unit], columns: &[Column], own: Option<&GroupExtrinsics>) -> Option<HeldOut> {
     let mut found = HeldOut { costs: vec![0.0; units.len()], end_m: 0.0, end_rad: 0.0 };
-    for fold in 0..FOLDS.min(units.len()) {
+    for fold in 0..NUISANCES.folds.min(units.len()) {
         let mut others: Vec<NormalEquations> =
             units.iter().filter(|unit| unit.fold != fold).map(|unit| unit.equations.clone()).collect();
         let responses = own.map_or_else(Vec::new, |own| own.eliminate(&mut others, &fit.solution.model));
@@ -241,9 +238,9 @@ fn held_out(fit: &ModelFit<'_>, units: &[Unit], columns: &[Column], own: Option<
 fn units_of(fit: &ModelFit<'_>, grouping: Option<Grouping>, gate: OutlierGate) -> Vec<Unit> {
     let runs = fit.solution.pass.runs.len().max(1);
     let parts = match (grouping, gate) {
-        (Some(Grouping::Run), gate) => fit.blocks(&mut [], BLOCKS_PER_RUN, gate),
+        (Some(Grouping::Run), gate) => fit.blocks(&mut [], NUISANCES.blocks_per_run, gate),
         (_, OutlierGate::On) => fit.units(&mut []),
-        (_, OutlierGate::Off) => fit.blocks(&mut [], MIN_RUNS_TO_HOLD_OUT.div_ceil(runs), gate),
+        (_, OutlierGate::Off) => fit.blocks(&mut [], NUISANCES.min_runs_to_hold_out.div_ceil(runs), gate),
     };
     // Blocks come block by block, runs in their order: neighbours, and the parts of a run, are in different
     // folds.
@@ -252,9 +249,9 @@ fn units_of(fit: &ModelFit<'_>, grouping: Option<Grouping>, gate: OutlierGate) -
         .into_iter()
         .enumerate()
         .map(|(number, equations)| {
-            let next = folds.get(&equations.run).map_or(number % FOLDS, |fold| fold + 1);
+            let next = folds.get(&equations.run).map_or(number % NUISANCES.folds, |fold| fold + 1);
             folds.insert(equations.run, next);
-            let fold = next % FOLDS;
+            let fold = next % NUISANCES.folds;
             Unit { fold, equations }
         })
         .collect()

@@ -20,11 +20,7 @@ use crate::normal_equations::{NormalEquations, total};
 use crate::optimizer::{ConvergenceCriterion, pass_settled};
 use crate::parts::{Part, over_parts};
 use crate::records::Records;
-use crate::settings::{
-    LARGE_ROWS, MAX_ROWS_PER_MEASUREMENT, MAX_SCORING_STEPS, MAX_SUBSAMPLE_ROWS, MIN_PART_BLOCKS,
-    MIN_PART_MEASUREMENTS, MIN_PART_PROPAGATIONS, ONE_STEP_TOLERANCE, PRELIMINARY_NOISE_TOLERANCE,
-    SUBSAMPLE_MEASUREMENTS, SUBSAMPLE_NOISE_TOLERANCE, SUBSAMPLES,
-};
+use crate::settings::{COMMON, LARGE_ROWS};
 use crate::thinning::Selection;
 
 /// How large datasets were calibrated.
@@ -64,7 +60,7 @@ pub fn is_large(datasets: &[Blocks]) -> bool {
 #[must_use]
 pub fn many_rows(datasets: &[Blocks]) -> bool {
     let (rows, measurements) = rows_and_measurements(datasets);
-    rows + measurements > LARGE_ROWS && measurements.saturating_mul(MAX_ROWS_PER_MEASUREMENT) >= rows
+    rows + measurements > LARGE_ROWS && measurements.saturating_mul(COMMON.max_rows_per_measurement) >= rows
 }
 
 /// Rows of the odometry of all runs, and of all that saw them.
@@ -119,8 +115,9 @@ pub fn fit_large(
 ) -> Result<LargeFit, OneStepError> {
     let subsamples = subsamples(datasets)?;
     let sessions: Vec<Session<'_>> = subsamples.iter().map(Dataset::session).collect();
-    let mut first = settings.fit_until(ConvergenceCriterion::NoiseShare(PRELIMINARY_NOISE_TOLERANCE), &sessions)?;
-    first.ends = ConvergenceCriterion::NoiseShare(SUBSAMPLE_NOISE_TOLERANCE);
+    let mut first =
+        settings.fit_until(ConvergenceCriterion::NoiseShare(COMMON.preliminary_noise_tolerance), &sessions)?;
+    first.ends = ConvergenceCriterion::NoiseShare(COMMON.subsample_noise_tolerance);
     first.refit(Some(first.current_values()), &mut [])?;
     let first_measurements = first.records.measurements();
     let part_blocks = part_blocks(&first, datasets);
@@ -136,7 +133,7 @@ pub fn fit_large(
         passes += 1;
         let GatheredParts { parts, measurements } = found.gather(datasets, part_blocks, &mut notice)?;
         let is_near = found.step_over(parts)?;
-        if is_near || passes == MAX_SCORING_STEPS {
+        if is_near || passes == COMMON.max_scoring_steps {
             found.solution.converged &= is_near;
             return Ok(LargeFit {
                 fit: found,
@@ -151,10 +148,11 @@ pub fn fit_large(
 /// The subsamples: a dataset of them from each dataset.
 fn subsamples(datasets: &mut [Blocks]) -> Result<Vec<Dataset>, DatasetError> {
     let (rows, measurements) = rows_and_measurements(datasets);
-    let wanted = (SUBSAMPLE_MEASUREMENTS.saturating_mul(rows) / measurements.max(1)).min(MAX_SUBSAMPLE_ROWS);
+    let wanted =
+        (COMMON.subsample_measurements.saturating_mul(rows) / measurements.max(1)).min(COMMON.max_subsample_rows);
     // A subsample is in the middle of each stride of rows.
-    let stride = (rows / SUBSAMPLES).max(1);
-    let within = stride.saturating_sub(wanted / SUBSAMPLES) / 2..(stride + wanted / SUBSAMPLES) / 2;
+    let stride = (rows / COMMON.subsamples).max(1);
+    let within = stride.saturating_sub(wanted / COMMON.subsamples) / 2..(stride + wanted / COMMON.subsamples) / 2;
     let mut before = 0;
     let mut subsamples = Vec::with_capacity(datasets.len());
     for blocks in datasets {
@@ -184,8 +182,11 @@ fn part_blocks(first: &ModelFit<'_>, datasets: &[Blocks]) -> usize {
     let propagations: usize =
         first.selections.first().map_or(0, |selection| selection.propagations.iter().map(Vec::len).sum::<usize>());
     let measurements_per_propagation = first.records.measurements().div_ceil(propagations.max(1));
-    let wanted_measurements = MIN_PART_MEASUREMENTS.max(MIN_PART_PROPAGATIONS * measurements_per_propagation);
-    MIN_PART_BLOCKS.max(wanted_measurements.saturating_mul(rows.div_ceil(measurements.max(1))).div_ceil(Blocks::ROWS))
+    let wanted_measurements =
+        COMMON.min_part_measurements.max(COMMON.min_part_propagations * measurements_per_propagation);
+    COMMON
+        .min_part_blocks
+        .max(wanted_measurements.saturating_mul(rows.div_ceil(measurements.max(1))).div_ceil(Blocks::ROWS))
 }
 
 impl ModelFit<'_> {
@@ -277,7 +278,7 @@ impl ModelFit<'_> {
             moved[column.index()] = step[row];
             self.solution.model.advance(*column, step[row]);
             let is_nonlinear = Column::GEOMETRY.contains(column) || *column == Column::SensorTheta;
-            is_near &= !is_nonlinear || step[row].powi(2) <= ONE_STEP_TOLERANCE * covariance[(row, row)].sqrt();
+            is_near &= !is_nonlinear || step[row].powi(2) <= COMMON.one_step_tolerance * covariance[(row, row)].sqrt();
         }
         responses
             .iter()

@@ -15,12 +15,7 @@ use crate::products::HeadingResponse;
 use crate::propagation::CachedPropagation;
 use crate::records::Records;
 use crate::segment::Segment;
-use crate::settings::{
-    ABSOLUTE_DAMPING, CACHED_STEP, CHI_SQUARE_1_MEDIAN, CONFIRMING_STEP_TOLERANCE, GATING_STEP,
-    HEADING_STEP_TOLERANCE_RAD, LEFT_BASIN_STEP, MAX_FIT_STEPS, MAX_GEOMETRY_STEP, MAX_NOISE_SCALING, MAX_NOISE_STEP,
-    MAX_UNGATED_STEPS, MEAN_COST_TOLERANCE, MEAN_STEP_TOLERANCE, MIN_NOISE_SIGMA, MIN_UNGATED_STEPS,
-    NOISE_COST_TOLERANCE, NOISE_STEP_TOLERANCE, RELATIVE_DAMPING, REUSE_TOLERANCE,
-};
+use crate::settings::{COMMON, START_HEADINGS};
 use crate::step_control::{Progress, StepDamping};
 use crate::thinning::Selection;
 
@@ -60,8 +55,8 @@ impl FitOptions {
             columns: columns.to_vec(),
             fixed: Vec::new(),
             noise_fixed: false,
-            ends: ConvergenceCriterion::NoiseShare(NOISE_STEP_TOLERANCE),
-            max_steps: MAX_FIT_STEPS,
+            ends: ConvergenceCriterion::NoiseShare(COMMON.noise_step_tolerance),
+            max_steps: COMMON.max_fit_steps,
             ungated: false,
             innovations: true,
         }
@@ -159,7 +154,7 @@ impl Fit<'_, '_> {
     /// these are rejected.
     fn take_ungated_steps(&mut self, terms: &mut [Box<dyn ModelTerm>]) -> Result<(), EstimationError> {
         let options = self.options;
-        for round in 1..=MAX_UNGATED_STEPS {
+        for round in 1..=COMMON.max_ungated_steps {
             // Partial measurements give no innovations; their noise follows its likelihood.
             let noise_score = self.records.is_partial() && !options.noise_fixed;
             let (gate, free) = (OutlierGate::Off, Some(&options.columns[..]));
@@ -175,12 +170,13 @@ impl Fit<'_, '_> {
                 let squares = found.innovations.iter().flatten().map(|innovation| innovation.z.powi(2));
                 let Some(median) = median(squares) else { break };
                 self.noise = self.noise.scaled(
-                    (median / CHI_SQUARE_1_MEDIAN).clamp(MAX_NOISE_SCALING.recip(), MAX_NOISE_SCALING),
-                    MIN_NOISE_SIGMA * MIN_NOISE_SIGMA,
+                    (median / COMMON.chi_square_1_median)
+                        .clamp(COMMON.max_noise_scaling.recip(), COMMON.max_noise_scaling),
+                    COMMON.min_noise_sigma * COMMON.min_noise_sigma,
                 );
             }
             // Where steps are large, a long path with few measurements makes all of them look like outliers.
-            if round >= MIN_UNGATED_STEPS && moved < GATING_STEP {
+            if round >= COMMON.min_ungated_steps && moved < COMMON.gating_step {
                 break;
             }
         }
@@ -246,24 +242,24 @@ pub(crate) fn fit_from(
             take_step(&mut fit.model, &mut fit.headings, &found, options, mean.by)?.1
         };
         let moved = mean.squared + own;
-        left_basin |= moved > LEFT_BASIN_STEP.max(*first.get_or_insert(moved));
+        left_basin |= moved > COMMON.left_basin_step.max(*first.get_or_insert(moved));
         // Convergence with cached propagations is confirmed by integrated ones, unless the model has hardly
         // moved since.
         moved_since_cached = if cached.is_none() { moved } else { moved_since_cached + moved };
-        let mean_settled = if confirms { CONFIRMING_STEP_TOLERANCE } else { MEAN_STEP_TOLERANCE };
-        is_near = moved < MEAN_COST_TOLERANCE && of_noise.squared() < NOISE_COST_TOLERANCE;
+        let mean_settled = if confirms { COMMON.confirming_step_tolerance } else { COMMON.mean_step_tolerance };
+        is_near = moved < COMMON.mean_cost_tolerance && of_noise.squared() < COMMON.noise_cost_tolerance;
         let settles = match options.ends {
             ConvergenceCriterion::NoiseShare(share) => moved < mean_settled && noise_step < share,
             ConvergenceCriterion::Likelihood => is_near,
         };
-        if settles && (cached.is_none() || moved_since_cached < REUSE_TOLERANCE) {
+        if settles && (cached.is_none() || moved_since_cached < COMMON.reuse_tolerance) {
             (converged, cached) = (true, cached.or(found.cached.take()));
             break;
         }
         if options.ends == ConvergenceCriterion::Likelihood && progress.has_stalled(moved + of_noise.squared()) {
             break;
         }
-        cached = if settles { None } else { cached.or(found.cached.take()).filter(|_| moved < CACHED_STEP) };
+        cached = if settles { None } else { cached.or(found.cached.take()).filter(|_| moved < COMMON.cached_step) };
         confirms = settles;
     }
     // After so small a step cached propagations are as good as integrated ones.
@@ -296,7 +292,9 @@ pub(crate) fn pass_settled(
             let turned = found.headings.iter().map(|heading| heading.response.rest.abs()).fold(0.0, f64::max);
             let mut next = model.clone();
             let (_, own) = take_step(&mut next, &mut headings, &found, &options, DVector::zeros(0))?;
-            if (turned < HEADING_STEP_TOLERANCE_RAD && own < MEAN_STEP_TOLERANCE) || round == MAX_UNGATED_STEPS {
+            if (turned < START_HEADINGS.heading_step_tolerance_rad && own < COMMON.mean_step_tolerance)
+                || round == COMMON.max_ungated_steps
+            {
                 return Ok(((model, headings), found));
             }
             model = next;
@@ -369,7 +367,10 @@ impl MeanStep {
             return Ok(Self { by: DVector::zeros(options.columns.len()), information: system.matrix, squared: 0.0 });
         }
         let reduced = system.along(basis);
-        let damping = reduced.matrix.diagonal().map(|information| RELATIVE_DAMPING * information + ABSOLUTE_DAMPING);
+        let damping = reduced
+            .matrix
+            .diagonal()
+            .map(|information| COMMON.relative_damping * information + COMMON.absolute_damping);
         let damped = reduced.clone().with_precision(damping.iter().copied());
         let (step, _) = damped.solve().ok_or(EstimationError::Diverges)?;
         let squared = (step.transpose() * &reduced.matrix * &step)[0];
@@ -389,7 +390,11 @@ fn take_step(
     let mut moved = vec![0.0; found.runs.first().ok_or(EstimationError::NoMeasurements)?.gradient.len()];
     for (column, by) in options.columns.iter().zip(step.iter_mut()) {
         // The next step goes on where this one is cut.
-        *by = if Column::GEOMETRY.contains(column) { by.clamp(-MAX_GEOMETRY_STEP, MAX_GEOMETRY_STEP) } else { *by };
+        *by = if Column::GEOMETRY.contains(column) {
+            by.clamp(-COMMON.max_geometry_step, COMMON.max_geometry_step)
+        } else {
+            *by
+        };
         if !by.is_finite() {
             return Err(EstimationError::Diverges);
         }
@@ -444,7 +449,7 @@ impl NoiseStep {
         let mut by: Vector4<f64> = &directions * along;
         // A variance at its lower bound does not fall.
         for (by, variance) in by.iter_mut().zip(noise.variance) {
-            if variance <= MIN_NOISE_SIGMA * MIN_NOISE_SIGMA {
+            if variance <= COMMON.min_noise_sigma * COMMON.min_noise_sigma {
                 *by = by.max(0.0);
             }
         }
@@ -459,10 +464,10 @@ impl NoiseStep {
 
 /// Moves the noise, by so much at the most; returns by how much.
 fn take_noise_step(noise: &mut Noise, by: Vector4<f64>) -> Vector4<f64> {
-    let by = by * (MAX_NOISE_STEP / by.amax()).min(1.0);
+    let by = by * (COMMON.max_noise_step / by.amax()).min(1.0);
     let before = *noise;
     for (variance, by) in noise.variance.iter_mut().zip(by.iter()) {
-        *variance = (*variance * by.exp()).max(MIN_NOISE_SIGMA * MIN_NOISE_SIGMA);
+        *variance = (*variance * by.exp()).max(COMMON.min_noise_sigma * COMMON.min_noise_sigma);
     }
     Vector4::from_fn(|k, _| (noise.variance[k] / before.variance[k]).ln())
 }

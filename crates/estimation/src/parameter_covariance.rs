@@ -10,7 +10,7 @@ use crate::normal_equations::{ClusterRobust, Information};
 use crate::optimizer::Solution;
 use crate::pass::pass;
 use crate::pass_options::{OutlierGate, PassOptions};
-use crate::settings::INFORMATION_WEIGHT_RUNS;
+use crate::settings::COMMON;
 use crate::systematic_errors::{OwnScatter, Shifts, SystematicErrors};
 
 impl ModelFit<'_> {
@@ -43,7 +43,8 @@ impl ModelFit<'_> {
                 robust += &by_scale * by_scale.transpose();
             }
             robust = with_systematic(robust, OwnScatter::Counted);
-            along = (robust * spare + along * INFORMATION_WEIGHT_RUNS) / (spare + INFORMATION_WEIGHT_RUNS);
+            along =
+                (robust * spare + along * COMMON.information_weight_runs) / (spare + COMMON.information_weight_runs);
         }
         let mut whole = &free * along * free.transpose();
         if let Some(added) = &self.by_systematic_errors {

@@ -28,10 +28,7 @@ use crate::products::{Products, Sums};
 use crate::propagation::{Moved, Propagator};
 use crate::quantum::variance_of_rounding;
 use crate::rounding::PoseVariance;
-use crate::settings::{
-    GYRO_BIAS_SIGMA_RADPS, LIDAR_PLACE_SIGMA_M, MIN_DISTANCE_M, PARTIAL_OUTLIER_CHI_SQUARE, RESTART_AFTER_OUTLIERS,
-    START_HEADING_SIGMA_RAD, START_POSITION_SIGMA_M, WALL_DIRECTION_SIGMA_RAD, WALL_OFFSET_SIGMA_M,
-};
+use crate::settings::{COMMON, PARTIAL, START_HEADING_SIGMA_RAD, START_POSITION_SIGMA_M};
 use crate::thinning::PropagationInterval;
 use crate::wall_start::{SeenByLidar, WallDistance, WallStart};
 
@@ -139,7 +136,7 @@ pub(crate) fn filter_taken(
                     let is_outlier = poses.is_outlier(of_segment, measurement);
                     rejected_in_a_row = if is_outlier { rejected_in_a_row + 1 } else { 0 };
                     // The poses' own filter starts anew there.
-                    let restarts = rejected_in_a_row >= RESTART_AFTER_OUTLIERS && measured.theta_rad.is_some();
+                    let restarts = rejected_in_a_row >= COMMON.restart_after_outliers && measured.theta_rad.is_some();
                     if restarts {
                         filter.start_anew(number);
                         rejected_in_a_row = 0;
@@ -180,7 +177,7 @@ impl<'f> PartialFilter<'f> {
         let first_slot = first_slot(&segment.walls);
         let size = first_slot + 3 * slots;
         let (mut state, mut covariance) = (DVector::zeros(size), DMatrix::zeros(size, size));
-        covariance[(bias_at(), bias_at())] = GYRO_BIAS_SIGMA_RADPS.powi(2);
+        covariance[(bias_at(), bias_at())] = PARTIAL.gyro_bias_sigma_radps.powi(2);
         let origin = start.unwrap_or(Pose::IDENTITY);
         (state[0], state[1], state[2]) = (origin.x_m, origin.y_m, origin.theta_rad);
         let yaw_rad = segment.walls.lidar.map_or(0.0, |lidar| lidar.yaw_rad);
@@ -189,13 +186,13 @@ impl<'f> PartialFilter<'f> {
             let direction_rad = origin.theta_rad + of.direction_rad;
             let (sin, cos) = sin_cos(direction_rad + yaw_rad);
             (state[at], state[at + 1]) = (direction_rad, of.offset_m - sin * origin.x_m + cos * origin.y_m);
-            covariance[(at, at)] = WALL_DIRECTION_SIGMA_RAD.powi(2);
-            covariance[(at + 1, at + 1)] = WALL_OFFSET_SIGMA_M.powi(2);
+            covariance[(at, at)] = PARTIAL.wall_direction_sigma_rad.powi(2);
+            covariance[(at + 1, at + 1)] = PARTIAL.wall_offset_sigma_m.powi(2);
         }
         if let Some(lidar) = segment.walls.lidar {
             let at = wall_at(segment.walls.walls.len());
             (state[at], state[at + 1], state[at + 2]) = (lidar.lever_m[0], lidar.lever_m[1], lidar.yaw_rad);
-            let sigmas = [LIDAR_PLACE_SIGMA_M, LIDAR_PLACE_SIGMA_M, WALL_DIRECTION_SIGMA_RAD];
+            let sigmas = [PARTIAL.lidar_place_sigma_m, PARTIAL.lidar_place_sigma_m, PARTIAL.wall_direction_sigma_rad];
             (0..3).for_each(|row| covariance[(at + row, at + row)] = sigmas[row].powi(2));
         }
         if start.is_some() {
@@ -367,7 +364,7 @@ impl<'f> PartialFilter<'f> {
             }
             Quantity::Distance => {
                 let distance_m = dx_m.hypot(dy_m);
-                if distance_m > MIN_DISTANCE_M {
+                if distance_m > PARTIAL.min_distance_m {
                     let axis = [dx_m / distance_m, dy_m / distance_m];
                     (by[to], by[to + 1]) = (axis[0], axis[1]);
                     (by[from], by[from + 1]) = (-axis[0], -axis[1]);
@@ -415,7 +412,7 @@ impl<'f> PartialFilter<'f> {
         let mut is_taken = self.update((of, by_terms), gate, model, columns, sums);
         if let Some(in_a_row) = kind.map(|kind| &mut self.wall_outliers_in_a_row[kind]) {
             *in_a_row = if is_taken { 0 } else { *in_a_row + 1 };
-            if *in_a_row >= RESTART_AFTER_OUTLIERS {
+            if *in_a_row >= COMMON.restart_after_outliers {
                 *in_a_row = 0;
                 self.start_anew(of.to);
                 is_taken = self.update((of, by_terms), gate, model, columns, sums);
@@ -445,7 +442,7 @@ impl<'f> PartialFilter<'f> {
         v -= by_terms.iter().zip(&model.term_values).map(|(by, size)| by * size).sum::<f64>();
         let ph = &self.covariance * &row;
         let s = row.dot(&ph) + of.variance;
-        if gate == OutlierGate::On && v * v > PARTIAL_OUTLIER_CHI_SQUARE * s {
+        if gate == OutlierGate::On && v * v > PARTIAL.partial_outlier_chi_square * s {
             return false;
         }
         let gain = &ph / s;

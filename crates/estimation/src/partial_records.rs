@@ -13,7 +13,7 @@ use kinematics::Wheels;
 use crate::model::Model;
 use crate::partial_observation::{Observation, Place, Quantity};
 use crate::segment::{Segment, Start};
-use crate::settings::{GYRO_WINDOW_S, MIN_STANDING_PAIRS, TIME_TOLERANCE_S};
+use crate::settings::{COMMON, PARTIAL, TIME_TOLERANCE_S};
 use crate::wall_start::WallStart;
 use crate::wheel_angles::WheelAngleInterpolator;
 
@@ -157,7 +157,7 @@ pub(crate) fn partial_segments<'a>(
         // Between equals the order of the files.
         observations.sort_by_key(|of| of.to);
         let walls = WallStart::of((&segment, &places, &observations), walls, nominal, lidar);
-        let bias_walk = gyro.stated.bias_walk_radps_per_sqrt_s.unwrap_or(crate::settings::BIAS_WALK_RADPS).powi(2);
+        let bias_walk = gyro.stated.bias_walk_radps_per_sqrt_s.unwrap_or(PARTIAL.bias_walk_radps).powi(2);
         PartialSegment { segment, places, observations, walls, bias_walk }
     };
     parts.into_iter().map(of_part).filter(|of| of.partial_measurements() > 0).collect()
@@ -262,7 +262,7 @@ impl GyroSettings {
                 variance: noise * noise * dt_s,
             }
         };
-        windows(run.run(), track, self.stated.is_instantaneous, GYRO_WINDOW_S).into_iter().map(timed).collect()
+        windows(run.run(), track, self.stated.is_instantaneous, PARTIAL.gyro_window_s).into_iter().map(timed).collect()
     }
 }
 
@@ -315,15 +315,15 @@ fn noise_from_log(session: &Session<'_>, drive: &Model) -> Option<f64> {
             let turned = turned.into_iter().fold(Wheels::both(0.0), |sum, by| sum.zip_with(by, |a, b| a + b));
             Some(window.turn_rad - drive.increment(turned).turn_rad)
         };
-        let longer = windows(run.run(), &track, instantaneous, GYRO_WINDOW_S);
+        let longer = windows(run.run(), &track, instantaneous, PARTIAL.gyro_window_s);
         moving.extend(longer.windows(2).filter_map(|pair| Some(squared(pair, [strays(&pair[0])?, strays(&pair[1])?]))));
     }
-    let variance = if standing.len() >= MIN_STANDING_PAIRS {
+    let variance = if standing.len() >= PARTIAL.min_standing_pairs {
         standing.iter().sum::<f64>() / standing.len() as f64
     } else {
-        median(moving)? / crate::settings::CHI_SQUARE_1_MEDIAN
+        median(moving)? / COMMON.chi_square_1_median
     };
-    Some(variance.sqrt().max(crate::settings::MIN_GYRO_NOISE_RAD_PER_SQRT_S))
+    Some(variance.sqrt().max(PARTIAL.min_gyro_noise_rad_per_sqrt_s))
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use dataset::{Blocks, Dataset, DatasetError, Warning};
 
-use crate::settings::MAX_PART_THREADS;
+use crate::settings::COMMON;
 
 /// Successive blocks of one run.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -36,7 +36,7 @@ pub fn over_parts<T: Send, E: From<DatasetError> + Send>(
     of_part: impl Fn(&Part, Dataset) -> Result<T, E> + Sync,
     mut notice: impl FnMut(usize, &Warning),
 ) -> Result<Vec<T>, E> {
-    let workers = std::thread::available_parallelism().map_or(1, usize::from).min(MAX_PART_THREADS);
+    let workers = std::thread::available_parallelism().map_or(1, usize::from).min(COMMON.max_part_threads);
     let mut results = std::thread::scope(|scope| -> Result<Vec<(usize, T)>, E> {
         // No part waits in memory: the reading thread waits for a worker.
         let (give, take) = sync_channel::<(usize, Dataset)>(0);

@@ -27,7 +27,7 @@ use crate::products::{HeadingResponse, Products};
 use crate::propagation::{CachedPropagation, CarriedState, Change, PropagationSource, SegmentCache};
 use crate::records::Records;
 use crate::segment::{Segment, Start};
-use crate::settings::{MIN_PARALLEL_WORK, MIN_RESTRICTED_SHARE};
+use crate::settings::{COMMON, MIN_PARALLEL_WORK};
 use crate::thinning::{PropagationInterval, Selection};
 
 /// The result of a pass.
@@ -86,7 +86,7 @@ impl Pass {
         // Of many measurements the share is below what is known of the noise. Where some are rejected the
         // noise would grow without end.
         let share = (fitted / measured).min(1.0);
-        let taken = if self.outliers.is_empty() && share > MIN_RESTRICTED_SHARE { share } else { 0.0 };
+        let taken = if self.outliers.is_empty() && share > COMMON.min_restricted_share { share } else { 0.0 };
         // The rows of the information add up to the traces, as the variances do to S.
         self.noise.gradient - self.noise.information * Vector4::repeat(taken)
     }

@@ -17,7 +17,7 @@ use crate::model::Model;
 use crate::quantum::variance_of_rounding;
 use crate::rounding::PoseVariance;
 use crate::segment::{MeasuredPose, Segment};
-use crate::settings::{MAX_INTERPOLATED_VARIANCE_RATIO, MAX_SHARED_VARIANCE_RATIO, MIN_POSES_NEAR_ROWS};
+use crate::settings::POSES_BETWEEN_ROWS;
 use crate::wheel_angles::WheelInterval;
 
 /// Leaves out poses that share their errors with one that is nearer to the same row. `rows_s` are the
@@ -31,7 +31,7 @@ pub(crate) fn take_one_for_each_row(segment: &mut Segment<'_>, rows_s: &[f64], n
         let shared = variance(interval, segment.quantum_rad, nominal);
         let per_second = nominal.increment(interval.rate_rad_s);
         let is_more = |shared: f64, [sigma, factor, speed]: [f64; 3]| {
-            shared > MAX_SHARED_VARIANCE_RATIO * (sigma * sigma * factor + speed * speed * late_s2)
+            shared > POSES_BETWEEN_ROWS.max_shared_variance_ratio * (sigma * sigma * factor + speed * speed * late_s2)
         };
         let [position, heading] = reference;
         let [of_position, of_heading] = measured.variance_factor;
@@ -64,7 +64,7 @@ pub(crate) fn take_those_near_rows(segment: &mut Segment<'_>, nominal: &Model, r
         let interpolated = PoseVariance::of(intervals[last].interpolated_rad2[1], nominal);
         let is_within = |interpolated: f64, at_row: f64, [sigma, factor]: [f64; 2]| {
             let measured = sigma * sigma * factor;
-            interpolated <= MAX_INTERPOLATED_VARIANCE_RATIO * measured || at_row > measured
+            interpolated <= POSES_BETWEEN_ROWS.max_interpolated_variance_ratio * measured || at_row > measured
         };
         let ([position, heading], [of_position, of_heading]) = (reference, measured.variance_factor);
         is_within(interpolated.along_m2, at_row.along_m2, [position, of_position])
@@ -75,7 +75,7 @@ pub(crate) fn take_those_near_rows(segment: &mut Segment<'_>, nominal: &Model, r
     let numbered = measurements.iter().enumerate();
     let near: Vec<MeasuredPose> =
         numbered.filter(|(k, measured)| *k < 2 || *k == last || is_near(measured)).map(|(_, of)| *of).collect();
-    if near.len() >= MIN_POSES_NEAR_ROWS {
+    if near.len() >= POSES_BETWEEN_ROWS.min_poses_near_rows {
         *measurements = near;
     }
 }

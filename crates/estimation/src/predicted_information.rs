@@ -12,7 +12,7 @@ use crate::model_fit::ModelFit;
 use crate::noise::Noise;
 use crate::optimizer::{ConvergenceCriterion, Solution};
 use crate::pass::Pass;
-use crate::settings::NOISE_STEP_TOLERANCE;
+use crate::settings::COMMON;
 use crate::thinning::Selection;
 
 impl<'a> ModelFit<'a> {
@@ -22,7 +22,7 @@ impl<'a> ModelFit<'a> {
         let fit = Self::before_any_step(
             sessions,
             model.clone(),
-            ConvergenceCriterion::NoiseShare(NOISE_STEP_TOLERANCE),
+            ConvergenceCriterion::NoiseShare(COMMON.noise_step_tolerance),
             false,
         );
         let free_headings = fit.records.start_headings_rad(&model);

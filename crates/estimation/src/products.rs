@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::layout::Layout;
 use crate::model::Column;
 use crate::normal_equations::NormalEquations;
-use crate::settings::{MIN_VARIANCE_PRODUCT, START_HEADING_PRECISION};
+use crate::settings::{MIN_VARIANCE_PRODUCT, START_HEADINGS};
 
 /// Which columns' products a normal equation has. Outer products grow with the square of the columns;
 /// candidates that are tested one by one need none with each other.
@@ -176,7 +176,7 @@ impl<'p> Sums<'p> {
         let (said, gradient) = (last[carried], self.gradient[carried]);
         // A heading of which the run says hardly anything stays where it is: what errors alone bend would
         // wander on for ever.
-        let own = (said + START_HEADING_PRECISION).powi(2) / said;
+        let own = (said + START_HEADINGS.start_heading_precision).powi(2) / said;
         let cross = of_equations(&last[..carried]);
         let by: Vec<f64> = cross.iter().map(|cross| -cross / own).collect();
         for (row, by) in by.iter().enumerate() {
@@ -186,7 +186,7 @@ impl<'p> Sums<'p> {
             }
         }
         equations.chi_square -= gradient * gradient / own;
-        equations.log_det += (said + START_HEADING_PRECISION).ln();
+        equations.log_det += (said + START_HEADINGS.start_heading_precision).ln();
         equations.count -= 1.0;
         (equations, Some(HeadingResponse { rest: -gradient / own, by, information: own }))
     }

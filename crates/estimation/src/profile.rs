@@ -13,7 +13,7 @@ use crate::model::Column;
 use crate::model_fit::ModelFit;
 use crate::normal_equations::NormalEquations;
 use crate::optimizer::{FitOptions, fit_from};
-use crate::settings::{MAX_PROFILE_STEPS, MIN_PROFILE_RISE, PROFILE_RISE_TOLERANCE};
+use crate::settings::COMMON;
 
 impl ModelFit<'_> {
     /// The interval of a free column's steps, relative to the estimate, at whose ends the cost has risen by
@@ -46,14 +46,14 @@ impl ModelFit<'_> {
     fn end(&self, column: Column, position: usize, first: f64, level: f64) -> Result<f64, EstimationError> {
         let best = self.cost();
         let mut by = first;
-        for _ in 0..MAX_PROFILE_STEPS {
+        for _ in 0..COMMON.max_profile_steps {
             let risen = self.cost_with(column, position, by)? - best;
             let wanted = level - best;
-            if (risen - wanted).abs() < PROFILE_RISE_TOLERANCE * wanted {
+            if (risen - wanted).abs() < COMMON.profile_rise_tolerance * wanted {
                 break;
             }
             // A cost that rises little moves the end outwards by a factor of two at the most.
-            by *= (wanted / risen.max(MIN_PROFILE_RISE * wanted)).sqrt();
+            by *= (wanted / risen.max(COMMON.min_profile_rise * wanted)).sqrt();
         }
         Ok(by)
     }

@@ -7,7 +7,7 @@ use kinematics::Increment;
 use crate::model::Model;
 use crate::recorded_rates::RecordedRate;
 use crate::segment::Segment;
-use crate::settings::MAX_SHARED_RATES;
+use crate::settings::RECORDED_RATES;
 use crate::wheel_angles::WheelInterval;
 
 /// How long each recorded rate stands in intervals, seconds.
@@ -46,5 +46,5 @@ pub(crate) fn shared_rates(segments: &[Segment<'_>]) -> Vec<RecordedRate> {
     let mut rates: Vec<(RecordedRate, f64)> =
         time_s(rounded.flat_map(|segment| &segment.intervals)).into_iter().collect();
     rates.sort_by(|a, b| b.1.total_cmp(&a.1));
-    rates.into_iter().take(MAX_SHARED_RATES).map(|(rate, _)| rate).collect()
+    rates.into_iter().take(RECORDED_RATES.max_shared_rates).map(|(rate, _)| rate).collect()
 }

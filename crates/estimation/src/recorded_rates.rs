@@ -13,7 +13,7 @@ use std::f64::consts::TAU;
 use dataset::{NominalRobot, RunView, WheelLog, median};
 use kinematics::{Twist, Wheels};
 
-use crate::settings::{CHI_SQUARE_1_MEDIAN, MIN_COUNT_STEPS};
+use crate::settings::{COMMON, RECORDED_RATES};
 
 /// What a row says of both rates, in whole steps; 0 at rest, and where nothing is rounded.
 pub(crate) type RateSteps = [i32; 2];
@@ -97,9 +97,9 @@ fn dithering_variance(steps: &[i32], counted: Wheels<f64>) -> f64 {
     let in_motion = steps.windows(6).filter(|of| of.iter().any(|step| *step != 0));
     let fifth = |of: &[i32]| of.iter().zip(weights).map(|(step, weight)| weight * f64::from(*step)).sum::<f64>();
     let middle = median(in_motion.map(|of| fifth(of).powi(2))).unwrap_or(0.0);
-    let is_coarse = f64::max(counted.left, counted.right) >= MIN_COUNT_STEPS;
+    let is_coarse = f64::max(counted.left, counted.right) >= RECORDED_RATES.min_count_steps;
     let of_counts = if is_coarse { (of_one_sign * (counted.left + counted.right)).powi(2) } else { 0.0 };
-    0.25 * f64::max((middle - of_counts) / CHI_SQUARE_1_MEDIAN / squares_of_weights - 1.0 / 12.0, 0.0)
+    0.25 * f64::max((middle - of_counts) / COMMON.chi_square_1_median / squares_of_weights - 1.0 / 12.0, 0.0)
 }
 
 /// What rows say of one of both rates, without its sign: drives and their reverses have the same wheels, and

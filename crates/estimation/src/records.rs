@@ -18,7 +18,7 @@ use crate::noise_shape::NoiseShape;
 use crate::partial_records::{GyroSettings, PartialSegment, partial_segments};
 use crate::poses_between_rows::{take_one_for_each_row, take_those_near_rows};
 use crate::segment::{MeasuredPose, Segment, Start};
-use crate::settings::{AUTOCORRELATION_DECAY, GYRO_SCALE_SIGMA, TIME_TOLERANCE_S};
+use crate::settings::{COMMON, PARTIAL, TIME_TOLERANCE_S};
 use crate::wheel_angles::{WheelAngleInterpolator, WheelInterval};
 
 /// All that sessions hold for the likelihood.
@@ -167,7 +167,7 @@ impl<'a> Records<'a> {
 
     /// Standard deviation of the gyroscope's relative scale, before it is seen.
     pub(crate) fn gyro_scale_prior_sigma(&self) -> f64 {
-        self.gyro_scale_sigma.unwrap_or(GYRO_SCALE_SIGMA)
+        self.gyro_scale_sigma.unwrap_or(PARTIAL.gyro_scale_sigma)
     }
 
     /// Is the scale of the gyroscope stated?
@@ -281,7 +281,7 @@ impl<'a> Records<'a> {
         if segment == next {
             f64::from(u8::from(lag == 1))
         } else if self.are_in_series(segment, next) {
-            AUTOCORRELATION_DECAY.powi(lag - 1)
+            COMMON.autocorrelation_decay.powi(lag - 1)
         } else {
             0.0
         }

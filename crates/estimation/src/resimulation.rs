@@ -24,7 +24,7 @@ use crate::rate_noise::RateNoise;
 use crate::recorded_rates::RecordedRate;
 use crate::rounding::PoseVariance;
 use crate::segment::{MeasuredPose, Segment, Start};
-use crate::settings::MIN_RESIMULATED_VARIANCE_RATIO;
+use crate::settings::COMMON;
 use crate::wheel_angles::WheelInterval;
 
 impl ModelFit<'_> {
@@ -41,8 +41,8 @@ impl ModelFit<'_> {
                 segment.quantum_rad.zip_with(shared_rad2, |rad, shared| variance_of_rounding(rad) + shared);
             let at_ends = PoseVariance::of(at_ends_rad2, &self.solution.model);
             let [along_m2, turn_rad2] = segment.variance_of_rates(&self.solution.model);
-            at_ends.along_m2 + along_m2 > MIN_RESIMULATED_VARIANCE_RATIO * position_m2
-                || at_ends.heading_rad2 + turn_rad2 > MIN_RESIMULATED_VARIANCE_RATIO * heading_rad2
+            at_ends.along_m2 + along_m2 > COMMON.min_resimulated_variance_ratio * position_m2
+                || at_ends.heading_rad2 + turn_rad2 > COMMON.min_resimulated_variance_ratio * heading_rad2
         })
     }
 

@@ -24,7 +24,7 @@ use crate::filter_state::{FilterState, Step};
 use crate::model::Model;
 use crate::noise::NOISES;
 use crate::quantum::variance_of_rounding;
-use crate::settings::MIN_ROUNDING_VARIANCE_RATIO;
+use crate::settings::COMMON;
 
 /// Which pose the filter carries.
 #[derive(Clone, Copy)]
@@ -82,8 +82,8 @@ impl PoseVariance {
 
     /// Does it matter beside measurements of these variances of position and heading?
     fn matters(&self, [position_m2, heading_rad2]: [f64; 2]) -> bool {
-        self.along_m2 > MIN_ROUNDING_VARIANCE_RATIO * position_m2
-            || self.heading_rad2 > MIN_ROUNDING_VARIANCE_RATIO * heading_rad2
+        self.along_m2 > COMMON.min_rounding_variance_ratio * position_m2
+            || self.heading_rad2 > COMMON.min_rounding_variance_ratio * heading_rad2
     }
 
     /// Q in the room, for a heading.

@@ -6,7 +6,7 @@ use kinematics::{Pose, Wheels, wrap_to_pi};
 use crate::model::Model;
 use crate::noise_shape::NoiseShape;
 use crate::recorded_rates::RateRounding;
-use crate::settings::{SPEED_CHANGE_RATIO, SPEED_CHANGE_WINDOW_S, TIME_TOLERANCE_S};
+use crate::settings::{COMMON, TIME_TOLERANCE_S};
 use crate::wheel_angles::WheelInterval;
 use crate::wheel_rates::RateWindow;
 
@@ -98,7 +98,7 @@ impl Segment<'_> {
     }
 
     /// For each measurement, whether a wheel changed its speed since the measurement before, or within
-    /// `SPEED_CHANGE_WINDOW_S` where that is longer, by more than `SPEED_CHANGE_RATIO` of the fastest
+    /// `speed_change_window_s` where that is longer, by more than `speed_change_ratio` of the fastest
     /// speed in the segment.
     #[must_use]
     pub fn changes_of_speed(&self) -> Vec<bool> {
@@ -107,7 +107,7 @@ impl Segment<'_> {
         };
         let fastest = self.intervals.iter().map(speed).map(|of| of.left.abs().max(of.right.abs())).fold(0.0, f64::max);
         let changes = |(measurement, (before_s, _)): (&MeasuredPose, (f64, Wheels<f64>))| {
-            let from_s = (measurement.t_s - SPEED_CHANGE_WINDOW_S).min(before_s);
+            let from_s = (measurement.t_s - COMMON.speed_change_window_s).min(before_s);
             let near = self.intervals[..measurement.after]
                 .iter()
                 .rev()
@@ -118,7 +118,7 @@ impl Segment<'_> {
                 high = high.zip_with(of, f64::max);
             }
             let change = high.zip_with(low, |high, low| high - low);
-            change.left.max(change.right) > SPEED_CHANGE_RATIO * fastest
+            change.left.max(change.right) > COMMON.speed_change_ratio * fastest
         };
         self.measurements.iter().zip(self.since_previous_measurement()).map(changes).collect()
     }

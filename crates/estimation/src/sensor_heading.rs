@@ -5,7 +5,7 @@ use kinematics::{Increment, Pose, unwrap_near};
 use crate::model::Model;
 use crate::records::Records;
 use crate::segment::{Segment, Start};
-use crate::settings::{MIN_CHORD_RATIO, START_HEADING_BASELINE_M};
+use crate::settings::{COMMON, START_HEADINGS};
 
 impl Records<'_> {
     /// Approximate heading of the sensor on the robot, radians: from the directions of the measured and the
@@ -30,7 +30,7 @@ impl Records<'_> {
                         moved = moved * increment.arc();
                     }
                     // The end of a loop has no direction but that of its errors.
-                    if moved.x_m.hypot(moved.y_m) > MIN_CHORD_RATIO * distance_m {
+                    if moved.x_m.hypot(moved.y_m) > COMMON.min_chord_ratio * distance_m {
                         let measured = measured.to(pose);
                         dot += moved.x_m * measured.x_m + moved.y_m * measured.y_m;
                         cross += measured.x_m * moved.y_m - measured.y_m * moved.x_m;
@@ -68,7 +68,7 @@ pub(crate) fn start_heading(segment: &Segment<'_>, model: &Model, from: usize) -
         cross += moved.x_m * y_m - moved.y_m * x_m;
         longest_m = longest_m.max(x_m.hypot(y_m));
         // Dead reckoning is best near the start.
-        if longest_m > START_HEADING_BASELINE_M {
+        if longest_m > START_HEADINGS.start_heading_baseline_m {
             break;
         }
     }

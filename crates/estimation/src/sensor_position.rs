@@ -19,11 +19,7 @@ use nalgebra::{Complex, SMatrix, SVector};
 use crate::model::{Column, Model};
 use crate::records::Records;
 use crate::segment::Segment;
-use crate::settings::{
-    DRIVE_PRIOR_SIGMA, DRIVE_STEP, DRIVE_STEPS, LATENCY_PRIOR_SIGMA_S, MAX_WINDOW_SEPARATIONS,
-    MIN_SENSOR_POSITION_CHI_SQUARE, MIN_WINDOW_POSITIONS, SENSOR_POSITION_STARTS, SENSOR_POSITION_STEPS,
-    SENSOR_POSITION_TOLERANCE,
-};
+use crate::settings::{DRIVE_PRIOR_SIGMA, LATENCY_PRIOR_SIGMA_S, START_HEADINGS};
 
 /// Position of the instrument ahead of the drive's centre and to the left, metres, relative corrections of
 /// the drive's geometry, and the latency, seconds: of a robot that drives steadily it is a position behind
@@ -49,7 +45,7 @@ impl Records<'_> {
         let centre = PositionFit::found(&windows, nominal, of_nominal.clone(), &[Values::zeros()], Free::Others)?;
         let found = PositionFit::found(&windows, nominal, of_nominal, &at_start, Free::All)?;
         let gain = centre.cost - found.cost;
-        (gain > MIN_SENSOR_POSITION_CHI_SQUARE * found.variance()?).then_some(found.position_m)
+        (gain > START_HEADINGS.min_sensor_position_chi_square * found.variance()?).then_some(found.position_m)
     }
 }
 
@@ -87,7 +83,7 @@ impl PositionFit {
             if !cost.is_finite() || values.iter().any(|value| !value.is_finite()) {
                 return None;
             }
-            if step == DRIVE_STEPS {
+            if step == START_HEADINGS.drive_steps {
                 let freedom = of_model.iter().map(|window| window.freedom).sum::<f64>() - PARAMETERS as f64;
                 return Some(Self { position_m: [values[0], values[1]], cost, freedom });
             }
@@ -132,7 +128,7 @@ type Sample = [Complex<f64>; 2 + PARAMETERS];
 fn windows(segment: &Segment<'_>, model: &Model, near: Complex<f64>) -> Vec<Window> {
     let moved = Column::GEOMETRY.map(|column| {
         let mut moved = model.clone();
-        moved.advance(column, DRIVE_STEP);
+        moved.advance(column, START_HEADINGS.drive_step);
         moved
     });
     let mut found = Vec::new();
@@ -157,7 +153,7 @@ fn windows(segment: &Segment<'_>, model: &Model, near: Complex<f64>) -> Vec<Wind
         let (path, turn) = path_and_turn(pose);
         let [left, right, separation] = moved_poses.map(|moved| {
             let (moved, turned) = path_and_turn(moved);
-            (moved - path + (turned - turn) * near).unscale(DRIVE_STEP)
+            (moved - path + (turned - turn) * near).unscale(START_HEADINGS.drive_step)
         });
         let measured = Complex::new(measurement.x_m, measurement.y_m);
         let twist = model.twist(segment.rate_at(measurement.after, measurement.t_s));
@@ -165,13 +161,13 @@ fn windows(segment: &Segment<'_>, model: &Model, near: Complex<f64>) -> Vec<Wind
         let across = Complex::new(0.0, twist.omega_rad_s) * near;
         let by_latency = -(turn + 1.0) * (across + twist.v_m_s);
         samples.push([measured, path, turn, Complex::<f64>::i() * turn, left, right, separation, by_latency]);
-        let is_whole = turned_rad > TAU || distance_m > MAX_WINDOW_SEPARATIONS * model.separation_m;
-        if is_whole && samples.len() >= MIN_WINDOW_POSITIONS {
+        let is_whole = turned_rad > TAU || distance_m > START_HEADINGS.max_window_separations * model.separation_m;
+        if is_whole && samples.len() >= START_HEADINGS.min_window_positions {
             found.push(Window::of(&samples));
             samples.clear();
         }
     }
-    if samples.len() >= MIN_WINDOW_POSITIONS {
+    if samples.len() >= START_HEADINGS.min_window_positions {
         found.push(Window::of(&samples));
     }
     found
@@ -269,8 +265,8 @@ fn starts(windows: &[Window]) -> impl Iterator<Item = Values> {
         (turns + window.products[(0, 0)], longer + window.measured_by[0].norm())
     });
     let distance_m = if turns > 0.0 { longer / turns } else { 0.0 };
-    let round = (0..SENSOR_POSITION_STARTS).map(move |number| {
-        let (sin, cos) = sin_cos(TAU * f64::from(number) / f64::from(SENSOR_POSITION_STARTS));
+    let round = (0..START_HEADINGS.sensor_position_starts).map(move |number| {
+        let (sin, cos) = sin_cos(TAU * f64::from(number) / f64::from(START_HEADINGS.sensor_position_starts));
         Values::from_row_slice(&[distance_m * cos, distance_m * sin, 0.0, 0.0, 0.0, 0.0])
     });
     round.chain([Values::zeros()])
@@ -279,12 +275,12 @@ fn starts(windows: &[Window]) -> impl Iterator<Item = Values> {
 /// The minimum near some values, and its cost.
 fn minimised(windows: &[Window], start: Values, free: Free) -> (Values, f64) {
     let (mut values, mut cost) = (start, Cost::of(windows, &start));
-    for _ in 0..SENSOR_POSITION_STEPS {
+    for _ in 0..START_HEADINGS.sensor_position_steps {
         let next = cost.steps(free).map(|step| (step, Cost::of(windows, &(values + step))));
         let Some((step, next)) = next.into_iter().find(|(_, next)| next.value < cost.value) else { break };
         values += step;
         cost = next;
-        if step.norm() < SENSOR_POSITION_TOLERANCE * values.norm() {
+        if step.norm() < START_HEADINGS.sensor_position_tolerance * values.norm() {
             break;
         }
     }

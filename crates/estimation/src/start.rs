@@ -9,7 +9,7 @@ use crate::model::{Column, GroupExtrinsics, Grouping, Instrument, Model};
 use crate::model_fit::ModelFit;
 use crate::optimizer::ConvergenceCriterion;
 use crate::records::Records;
-use crate::settings::{MIN_START_DEVIATION, ROTATED_SENSOR_RAD, TURNED_SENSOR_RAD};
+use crate::settings::COMMON;
 
 impl<'a> ModelFit<'a> {
     /// Nothing is fitted: the sessions' records with `clock_s` of each taken off its stamps, the drive that
@@ -54,7 +54,7 @@ impl ModelFit<'_> {
         let heading_rad = self.records.sensor_heading_rad(&self.start);
         // Where windows determine the drive, a heading is no error of it.
         let is_certain = !starts.is_empty() && starts.iter().all(|start| start.drive.is_some());
-        let most_rad = if is_certain { TURNED_SENSOR_RAD } else { ROTATED_SENSOR_RAD };
+        let most_rad = if is_certain { COMMON.turned_sensor_rad } else { COMMON.rotated_sensor_rad };
         // To a latency that is free, less of a turn is a step too far.
         let is_late = is_certain && self.columns.contains(&Column::Latency);
         if is_late || heading_rad.abs() > most_rad {
@@ -66,7 +66,7 @@ impl ModelFit<'_> {
 
 /// Whether headings differ by more than a rotated sensor's.
 fn are_apart(headings_rad: &[f64]) -> bool {
-    headings_rad.iter().any(|heading_rad| wrap_to_pi(heading_rad - headings_rad[0]).abs() > ROTATED_SENSOR_RAD)
+    headings_rad.iter().any(|heading_rad| wrap_to_pi(heading_rad - headings_rad[0]).abs() > COMMON.rotated_sensor_rad)
 }
 
 /// The stated drive, or the one that the windows of motion show where it is far from that: from there, steps
@@ -75,7 +75,7 @@ fn started(nominal: &Model, starts: &[StartValues]) -> Model {
     let Some(DriveStart { m_per_rad, wheel_separation_m, .. }) = starts.iter().find_map(|start| start.drive) else {
         return nominal.clone();
     };
-    let is_far = |ratio: f64| ratio.ln().abs() > MIN_START_DEVIATION;
+    let is_far = |ratio: f64| ratio.ln().abs() > COMMON.min_start_deviation;
     let wheels = m_per_rad.zip_with(nominal.m_per_rad, |found, stated| found / stated);
     let lengths = [wheels.left, wheels.right, wheel_separation_m / nominal.separation_m];
     if lengths.into_iter().any(is_far) {

@@ -3,14 +3,14 @@
 
 use nalgebra::DVector;
 
-use crate::settings::MAX_SEPARATION_SHARE;
+use crate::settings::PARTIAL;
 
 /// Directions in relative left wheel, right wheel and separation that are not determined, turned into the
 /// plane of the wheels. They stay as they are where the separation itself is among them, and where
 /// measurements are not partial alone.
 pub(crate) fn with_stated_wheels(directions: Vec<DVector<f64>>, is_partial: bool) -> Vec<DVector<f64>> {
     let of_separation: f64 = directions.iter().map(|direction| direction[2] * direction[2]).sum();
-    if !is_partial || of_separation > MAX_SEPARATION_SHARE {
+    if !is_partial || of_separation > PARTIAL.max_separation_share {
         return directions;
     }
     match &directions[..] {

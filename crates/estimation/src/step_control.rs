@@ -2,7 +2,7 @@
 
 use nalgebra::Vector4;
 
-use crate::settings::{MAX_STEPS_WITHOUT_PROGRESS, STEP_DECREASE, STEP_INCREASE};
+use crate::settings::COMMON;
 
 /// Whether steps come to an end.
 #[derive(Default)]
@@ -21,7 +21,7 @@ impl Progress {
         } else {
             self.since += 1;
         }
-        self.since >= MAX_STEPS_WITHOUT_PROGRESS
+        self.since >= COMMON.max_steps_without_progress
     }
 }
 
@@ -47,11 +47,11 @@ impl StepDamping {
     pub(crate) fn damped(&mut self, step: Vector4<f64>) -> Vector4<f64> {
         for k in 0..step.len() {
             self.share[k] = if step[k] * self.last[k] < 0.0 {
-                STEP_DECREASE * self.share[k]
+                COMMON.step_decrease * self.share[k]
             } else if self.only_shorter {
                 self.share[k]
             } else {
-                (STEP_INCREASE * self.share[k]).min(1.0)
+                (COMMON.step_increase * self.share[k]).min(1.0)
             };
         }
         self.last = step;
@@ -70,14 +70,14 @@ mod tests {
             |squared: f64, times: usize| (0..times).map(|_| progress.has_stalled(squared)).collect::<Vec<_>>();
         assert_eq!(taken(1.0, 1), [false]);
         // Equal ones are no smaller; a smaller one begins anew.
-        assert!(!taken(1.0, MAX_STEPS_WITHOUT_PROGRESS - 1).contains(&true));
+        assert!(!taken(1.0, COMMON.max_steps_without_progress - 1).contains(&true));
         assert_eq!(taken(0.5, 1), [false]);
-        let mut on = taken(0.7, MAX_STEPS_WITHOUT_PROGRESS);
+        let mut on = taken(0.7, COMMON.max_steps_without_progress);
         assert_eq!(on.pop(), Some(true));
         assert!(!on.contains(&true));
         // Steps that are no number are no smaller either.
         let mut progress = Progress::default();
-        let stalled = (0..=MAX_STEPS_WITHOUT_PROGRESS).any(|_| progress.has_stalled(f64::NAN));
+        let stalled = (0..=COMMON.max_steps_without_progress).any(|_| progress.has_stalled(f64::NAN));
         assert!(stalled);
     }
 
@@ -88,12 +88,13 @@ mod tests {
         // From a whole step on nothing grows.
         assert_eq!(damping.damped(ahead), ahead);
         let turned = damping.damped(Vector4::new(-1.0, 2.0, 3.0, 5.0));
-        assert_eq!(turned, Vector4::new(-STEP_DECREASE, 2.0, 3.0 * STEP_DECREASE, 5.0));
+        assert_eq!(turned, Vector4::new(-COMMON.step_decrease, 2.0, 3.0 * COMMON.step_decrease, 5.0));
         let again = damping.damped(Vector4::new(-1.0, -2.0, 3.0, 5.0));
-        let grown = (STEP_INCREASE * STEP_DECREASE).min(1.0);
-        assert_eq!(again, Vector4::new(-grown, -2.0 * STEP_DECREASE, 3.0 * grown, 5.0));
+        let grown = (COMMON.step_increase * COMMON.step_decrease).min(1.0);
+        assert_eq!(again, Vector4::new(-grown, -2.0 * COMMON.step_decrease, 3.0 * grown, 5.0));
         // Back once more: it shrinks each time.
-        let [twice, grown_twice] = [STEP_DECREASE * STEP_DECREASE, (STEP_INCREASE * grown).min(1.0)];
+        let [twice, grown_twice] =
+            [COMMON.step_decrease * COMMON.step_decrease, (COMMON.step_increase * grown).min(1.0)];
         let back = damping.damped(Vector4::new(-1.0, 2.0, 3.0, 5.0));
         assert_eq!(back, Vector4::new(-grown_twice, 2.0 * twice, 3.0 * grown_twice, 5.0));
     }

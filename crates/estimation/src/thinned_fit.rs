@@ -12,7 +12,7 @@ use crate::error::EstimationError;
 use crate::model::Column;
 use crate::model_fit::ModelFit;
 use crate::optimizer::{ConvergenceCriterion, FitOptions};
-use crate::settings::{MIN_MEASUREMENTS_PER_RUN, SPACING_SLACK, THINNING_FACTOR, THINNING_PHASES};
+use crate::settings::THINNING;
 use crate::thinning::{Selection, Thinning};
 
 impl ModelFit<'_> {
@@ -29,7 +29,8 @@ impl ModelFit<'_> {
         let compared = FitOptions { ends: ConvergenceCriterion::Likelihood, ..self.fit_options() };
         let mut has_converged = true;
         loop {
-            let wider = if self.is_white() { None } else { self.thinned(THINNING_FACTOR * every_s, between_s) };
+            let wider =
+                if self.is_white() { None } else { self.thinned(THINNING.thinning_factor * every_s, between_s) };
             let wider = Rule::Thinning.finds(wider);
             if wider.is_none() && has_converged {
                 return Ok(());
@@ -38,7 +39,7 @@ impl ModelFit<'_> {
             has_converged = wider.is_none();
             match wider {
                 Some((thinning, selections)) => {
-                    every_s *= THINNING_FACTOR;
+                    every_s *= THINNING.thinning_factor;
                     (self.selections, self.thinning) = (Arc::new(selections), thinning);
                     self.refit_by(&compared, Some(self.current_values()), terms)?;
                 }
@@ -103,15 +104,17 @@ impl ModelFit<'_> {
 
     /// Measurements at a spacing of `every_s`, seconds; `None` when a run has too few left.
     fn thinned(&self, every_s: f64, between_s: f64) -> Option<(Thinning, Vec<Selection>)> {
-        let thinning = Thinning { every_s: every_s - SPACING_SLACK * between_s, phases: THINNING_PHASES };
+        let thinning =
+            Thinning { every_s: every_s - THINNING.spacing_slack * between_s, phases: THINNING.thinning_phases };
         let selections = Selection::of(&self.records, thinning, &self.start);
-        (selections[0].mean_measurements(&self.records) >= MIN_MEASUREMENTS_PER_RUN).then_some((thinning, selections))
+        (selections[0].mean_measurements(&self.records) >= THINNING.min_measurements_per_run)
+            .then_some((thinning, selections))
     }
 
     /// Does [`Self::thin`] leave measurements out?
     pub(crate) fn is_to_be_thinned(&self) -> bool {
         let between_s = median(self.records.times_between()).filter(|_| !self.is_white());
-        between_s.is_some_and(|between_s| self.thinned(THINNING_FACTOR * between_s, between_s).is_some())
+        between_s.is_some_and(|between_s| self.thinned(THINNING.thinning_factor * between_s, between_s).is_some())
     }
 
     /// The fit without its innovations, most of its memory; [`Self::with_innovations`] finds them again.

@@ -22,7 +22,7 @@ use crate::partial_observation::Place;
 use crate::partial_records::PartialSegment;
 use crate::records::Records;
 use crate::segment::{Segment, Start};
-use crate::settings::{MIN_CACHED_INTERVALS, MIN_INTERVALS_PER_CACHED_PROPAGATION, TIME_TOLERANCE_S};
+use crate::settings::{COMMON, TIME_TOLERANCE_S};
 
 /// How measurements are thinned.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -131,8 +131,8 @@ impl Selection {
     pub(crate) fn has_long_propagations(all: &[Self], with_terms: bool) -> bool {
         let propagations = || all.iter().flat_map(|selection| &selection.propagations).flatten();
         let intervals: usize = propagations().map(|propagation| propagation.intervals.len()).sum();
-        let least = if with_terms { 1 } else { MIN_INTERVALS_PER_CACHED_PROPAGATION };
-        intervals >= MIN_CACHED_INTERVALS && intervals >= least * propagations().count()
+        let least = if with_terms { 1 } else { COMMON.min_intervals_per_cached_propagation };
+        intervals >= COMMON.min_cached_intervals && intervals >= least * propagations().count()
     }
 
     /// Mean number of measurements of a series that has any, without its start. A series is a segment of

@@ -12,13 +12,13 @@ use model_term::ModelTerm;
 use crate::error::EstimationError;
 use crate::model_fit::ModelFit;
 use crate::noise::Noise;
-use crate::settings::{MAX_TIMING_NOISE_STEPS, MIN_TIMING_NOISE_SIGMAS, TIMING_NOISE_TOLERANCE};
+use crate::settings::COMMON;
 
 impl ModelFit<'_> {
     /// Whether the noise of instants is larger than it is in the fit, beyond chance.
     #[must_use]
     pub fn has_timing_noise(&self) -> bool {
-        self.solution.pass.timing.z() > MIN_TIMING_NOISE_SIGMAS
+        self.solution.pass.timing.z() > COMMON.min_timing_noise_sigmas
     }
 
     /// Fits the noise of instants where it is significant, with the values that were found. `terms` are those
@@ -30,11 +30,11 @@ impl ModelFit<'_> {
         if !self.has_timing_noise() {
             return Ok(());
         }
-        for _ in 0..MAX_TIMING_NOISE_STEPS {
+        for _ in 0..COMMON.max_timing_noise_steps {
             let before_s2 = self.prior.timing_s2;
             let next_s2 = (before_s2 + self.solution.pass.timing.step_s2()).max(0.0);
             self.refit_at_timing_noise(next_s2, terms)?;
-            if (next_s2 - before_s2).abs() <= TIMING_NOISE_TOLERANCE * next_s2 {
+            if (next_s2 - before_s2).abs() <= COMMON.timing_noise_tolerance * next_s2 {
                 break;
             }
         }

@@ -13,9 +13,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::model::Model;
 use crate::partial_observation::{Observation, Place, Quantity};
 use crate::segment::Segment;
-use crate::settings::{
-    LIDAR_PLACE_SIGMA_M, WALL_DIRECTION_SIGMA_RAD, WALL_OFFSET_SIGMA_M, WALL_START_DIRECTIONS, WALL_START_STEPS,
-};
+use crate::settings::PARTIAL;
 
 /// A wall by its direction, less the lidar's yaw where there is one, and its distance from the segment's
 /// start.
@@ -92,7 +90,8 @@ impl WallStart {
 
 /// The directions that are tried.
 fn directions_rad() -> impl Iterator<Item = f64> {
-    (0..WALL_START_DIRECTIONS).map(|k| std::f64::consts::TAU * f64::from(k) / f64::from(WALL_START_DIRECTIONS))
+    (0..PARTIAL.wall_start_directions)
+        .map(|k| std::f64::consts::TAU * f64::from(k) / f64::from(PARTIAL.wall_start_directions))
 }
 
 fn nominal_poses(segment: &Segment<'_>, places: &[Place], nominal: &Model) -> Vec<Pose> {
@@ -155,7 +154,7 @@ fn fitted_offset(direction_rad: f64, distances: &[(Pose, f64)]) -> (Wall, f64) {
 
 /// The same with the direction turned by Newton steps on the variance of the offsets.
 fn turned_to_fit(mut direction_rad: f64, distances: &[(Pose, f64)]) -> (Wall, f64) {
-    for _ in 0..WALL_START_STEPS {
+    for _ in 0..PARTIAL.wall_start_steps {
         let (wall, _) = fitted_offset(direction_rad, distances);
         let (sin, cos) = direction_rad.sin_cos();
         let slope_m = |pose: &Pose| -cos * pose.x_m - sin * pose.y_m;
@@ -196,11 +195,11 @@ fn fitted_lidar(yaw_rad: f64, walls: &[Wall], seen: &[SeenDistance]) -> (WallSta
         of.distance_m - (values[of.wall] + sin * of.pose.x_m - cos * of.pose.y_m - lidar_m)
     };
     let prior_sigma = |row: usize| match row {
-        row if row < lever => WALL_OFFSET_SIGMA_M,
-        row if row < yaw => LIDAR_PLACE_SIGMA_M,
-        _ => WALL_DIRECTION_SIGMA_RAD,
+        row if row < lever => PARTIAL.wall_offset_sigma_m,
+        row if row < yaw => PARTIAL.lidar_place_sigma_m,
+        _ => PARTIAL.wall_direction_sigma_rad,
     };
-    for _ in 0..WALL_START_STEPS {
+    for _ in 0..PARTIAL.wall_start_steps {
         // What the readings do not determine hardly moves.
         let mut information =
             DMatrix::from_fn(

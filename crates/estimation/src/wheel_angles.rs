@@ -9,7 +9,7 @@ use dataset::{NominalRobot, RestoredMotion, Run, RunView, WheelLog, row_jitter_s
 use kinematics::{Count, Wheels};
 
 use crate::recorded_rates::{RateRounding, RateSteps, RecordedRates};
-use crate::settings::{MAX_EXTRAPOLATION, ROWS_OF_CHANGE, TIME_TOLERANCE_S};
+use crate::settings::{COMMON, TIME_TOLERANCE_S};
 use crate::wheel_rates::{RateWindow, WheelRates, are_inexact, quantum_of_angles};
 
 /// A stretch of the log within one row.
@@ -219,7 +219,7 @@ impl<'a> WheelAngleInterpolator<'a> {
         let (row, outside_s) =
             if before == 0 { (0, rows_s[0] - t_s) } else { (last.checked_sub(1)?, t_s - rows_s[last]) };
         let next_s = rows_s.get(row + 1).filter(|_| self.continuous)?;
-        (outside_s <= MAX_EXTRAPOLATION * (next_s - rows_s[row])).then_some(row)
+        (outside_s <= COMMON.max_extrapolation * (next_s - rows_s[row])).then_some(row)
     }
 
     fn turn_at(&self, row: usize, t_s: f64) -> Option<Wheels<f64>> {
@@ -297,7 +297,7 @@ impl<'a> WheelAngleInterpolator<'a> {
                 if is_taken { change } else { change.max(before * before).max(after * after) }
             }))
         };
-        let near = row.saturating_sub(ROWS_OF_CHANGE)..row + ROWS_OF_CHANGE + 1;
+        let near = row.saturating_sub(COMMON.rows_of_change)..row + COMMON.rows_of_change + 1;
         let (sum, count) = near.filter_map(off_by).fold((Wheels::both(0.0), 0.0_f64), |(sum, count), off_by| {
             (sum.zip_with(off_by, |sum, off_by| sum + off_by), count + 1.0)
         });

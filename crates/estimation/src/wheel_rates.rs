@@ -12,11 +12,7 @@ use dataset::median;
 use kinematics::Wheels;
 
 use crate::quantum::variance_of_rounding;
-use crate::settings::{
-    GAP_RATIO, GENTLE_ACCELERATION_M_S2, MAX_EXACT_JITTER, MAX_ROUNDING_S, MAX_ROW_RATE_NOISE, MAX_ROW_SPREAD,
-    MAX_STEADY_ROW_S, MIN_BEAT_JITTER, MIN_GRID_FRACTION, MIN_GRID_STEPS, MIN_PACKET_ROW_SHARE, MIN_QUANTUM_RAD,
-    MIN_ROW_SHARE, QUANTUM_TOLERANCE, RATE_NOISE_FRACTION, RATE_ROUNDING_FRACTION, RATE_WINDOWS, ROWS_OF_STRETCH,
-};
+use crate::settings::{COMMON, WHEEL_RATES};
 
 /// Rates at the rows of a run.
 #[derive(Debug, Clone)]
@@ -61,7 +57,7 @@ impl WheelRates {
         // Stamps that counts follow are true however they jitter.
         let due_s: Vec<f64>;
         let (mut t_s, mut came_together) = (t_s, false);
-        if jitter_s > MAX_EXACT_JITTER * row_s {
+        if jitter_s > COMMON.max_exact_jitter * row_s {
             due_s = due(t_s, late_s, wrong_share);
             t_s = &due_s;
         }
@@ -81,9 +77,9 @@ impl WheelRates {
         let variance = [0, 1].map(|side| variance_of_rounding(quanta[side]) + mean_square[side] * jitter_s * jitter_s);
         let row_by_row = stretch_s > 0.0
             && !came_together
-            && [0, 1]
-                .iter()
-                .all(|&side| 2.0 * variance[side] / (stretch_s * stretch_s) <= MAX_ROW_RATE_NOISE * mean_square[side]);
+            && [0, 1].iter().all(|&side| {
+                2.0 * variance[side] / (stretch_s * stretch_s) <= WHEEL_RATES.max_row_rate_noise * mean_square[side]
+            });
         let of_window = |half: usize| turns.map(|turn_rad| slopes(t_s, turn_rad, &pieces, half));
         let over_window = |variance: [f64; 2], half: usize| {
             let half = half as f64;
@@ -92,13 +88,13 @@ impl WheelRates {
         };
         let noise = |half: usize| over_window(variance, half);
         let rounding = quanta.map(variance_of_rounding);
-        let mut rates = of_window(RATE_WINDOWS[0]);
-        let mut half_rows = RATE_WINDOWS[0];
-        for pair in RATE_WINDOWS.windows(2) {
+        let mut rates = of_window(WHEEL_RATES.rate_windows[0]);
+        let mut half_rows = WHEEL_RATES.rate_windows[0];
+        for pair in WHEEL_RATES.rate_windows.windows(2) {
             let [now, wider] = [noise(pair[0]), noise(pair[1])];
             let is_below = |noise, fraction| is_below_signal(&rates, noise, fraction, separation_m, m_per_rad);
-            let is_enough =
-                is_below(now, RATE_NOISE_FRACTION) && is_below(over_window(rounding, pair[0]), RATE_ROUNDING_FRACTION);
+            let is_enough = is_below(now, WHEEL_RATES.rate_noise_fraction)
+                && is_below(over_window(rounding, pair[0]), WHEEL_RATES.rate_rounding_fraction);
             if is_enough || variance == [0.0; 2] {
                 break;
             }
@@ -119,7 +115,7 @@ impl WheelRates {
         let is_rounded = quanta.iter().any(|quantum| *quantum > 0.0);
         let counted = if is_rounded { (1..t_s.len()).filter(came).collect() } else { Vec::new() };
         let count_m = [0, 1].map(|side| quanta[side] * m_per_rad[side]).into_iter().fold(0.0, f64::max);
-        let count_s = is_rounded.then(|| (2.0 * count_m / GENTLE_ACCELERATION_M_S2).sqrt());
+        let count_s = is_rounded.then(|| (2.0 * count_m / COMMON.gentle_acceleration_m_s2).sqrt());
         Self { at_rows_rad_s: Wheels { left, right }, window, quantum_rad, starts, counted, count_s }
     }
 
@@ -136,7 +132,7 @@ impl WheelRates {
     /// Do the wheels' rates change steadily between a row and the next? Not over a gap, nor over rows that
     /// are longer than it takes a robot to speed up.
     pub(crate) fn are_joined(&self, t_s: &[f64], row: usize) -> bool {
-        let is_short = t_s.get(row + 1).is_some_and(|next_s| next_s - t_s[row] <= MAX_STEADY_ROW_S);
+        let is_short = t_s.get(row + 1).is_some_and(|next_s| next_s - t_s[row] <= COMMON.max_steady_row_s);
         is_short && self.starts.binary_search(&(row + 1)).is_err()
     }
 
@@ -155,23 +151,25 @@ impl WheelRates {
 /// that turns counts into angles leaves them rounded. 0 where they are not. The greatest common divisor by
 /// Euclid, up to the rounding of the file's numbers.
 pub(crate) fn quantum_of_angles(angle_rad: &[f64]) -> f64 {
-    let steps = || angle_rad.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > QUANTUM_TOLERANCE);
+    let steps =
+        || angle_rad.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > COMMON.quantum_tolerance);
     let divisor = |mut a: f64, mut b: f64| {
-        while b > QUANTUM_TOLERANCE {
+        while b > COMMON.quantum_tolerance {
             (a, b) = (b, (a - (a / b).round() * b).abs());
         }
         a
     };
-    let quantum =
-        steps().take(MIN_GRID_STEPS).fold(0.0, |quantum: f64, step| divisor(quantum.max(step), quantum.min(step)));
-    if quantum < MIN_QUANTUM_RAD || steps().count() < MIN_GRID_STEPS {
+    let quantum = steps()
+        .take(COMMON.min_grid_steps)
+        .fold(0.0, |quantum: f64, step| divisor(quantum.max(step), quantum.min(step)));
+    if quantum < COMMON.min_quantum_rad || steps().count() < COMMON.min_grid_steps {
         return 0.0;
     }
     let (on_grid, all) = steps().fold((0.0, 0.0_f64), |(on_grid, all), step| {
         let off_rad = step - (step / quantum).round() * quantum;
         (on_grid + f64::from(u8::from(off_rad.abs() < 0.1 * quantum)), all + 1.0)
     });
-    if on_grid >= MIN_GRID_FRACTION * all { quantum } else { 0.0 }
+    if on_grid >= COMMON.min_grid_fraction * all { quantum } else { 0.0 }
 }
 
 /// Is the noise of the rates of the centre and of the turn below a fraction of their own variance?
@@ -273,15 +271,18 @@ fn least_row_s<'t>(
         turned(&turn_rad.left, quantum_rad.left) || turned(&turn_rad.right, quantum_rad.right)
     };
     let mean_s = mean((0..lengths_s.len()).filter(turns_on).map(|row| lengths_s[row]));
-    let in_packets = mean_s > MAX_ROW_SPREAD * median(lengths_s.iter().copied()).unwrap_or(0.0);
+    let in_packets = mean_s > WHEEL_RATES.max_row_spread * median(lengths_s.iter().copied()).unwrap_or(0.0);
     // Medians of stretches: rates of rows may differ along a log.
-    let medians_s: Vec<f64> =
-        lengths_s.chunks(ROWS_OF_STRETCH).map(|stretch| median(stretch.iter().copied()).unwrap_or(0.0)).collect();
+    let medians_s: Vec<f64> = lengths_s
+        .chunks(WHEEL_RATES.rows_of_stretch)
+        .map(|stretch| median(stretch.iter().copied()).unwrap_or(0.0))
+        .collect();
     move |row| {
         if in_packets {
-            return MIN_PACKET_ROW_SHARE * mean_s;
+            return WHEEL_RATES.min_packet_row_share * mean_s;
         }
-        MIN_ROW_SHARE * medians_s.get(row.min(t_s.len().saturating_sub(2)) / ROWS_OF_STRETCH).copied().unwrap_or(0.0)
+        WHEEL_RATES.min_row_share
+            * medians_s.get(row.min(t_s.len().saturating_sub(2)) / WHEEL_RATES.rows_of_stretch).copied().unwrap_or(0.0)
     }
 }
 
@@ -305,7 +306,7 @@ fn share_of_true_stamps(t_s: &[f64], turn_rad: &Wheels<Vec<f64>>) -> f64 {
 /// Stretches of rows without a gap; in a log with gaps each row stands alone.
 pub(crate) fn pieces(t_s: &[f64], continuous: bool) -> Vec<std::ops::Range<usize>> {
     let longest_s = if continuous {
-        GAP_RATIO * median(t_s.windows(2).map(|pair| pair[1] - pair[0])).unwrap_or(f64::INFINITY)
+        COMMON.gap_ratio * median(t_s.windows(2).map(|pair| pair[1] - pair[0])).unwrap_or(f64::INFINITY)
     } else {
         0.0
     };
@@ -322,8 +323,8 @@ pub(crate) fn pieces(t_s: &[f64], continuous: bool) -> Vec<std::ops::Range<usize
 /// Do a log's stamps jitter by more than what numbers in a file are rounded by?
 pub(crate) fn are_inexact(t_s: &[f64]) -> bool {
     let row_s = median(t_s.windows(2).map(|pair| pair[1] - pair[0])).unwrap_or(0.0);
-    let of_a_file_s = MAX_ROUNDING_S.max(MIN_BEAT_JITTER * row_s);
-    stamp_jitter_s(t_s) > of_a_file_s.min(MAX_EXACT_JITTER * row_s)
+    let of_a_file_s = COMMON.max_rounding_s.max(COMMON.min_beat_jitter * row_s);
+    stamp_jitter_s(t_s) > of_a_file_s.min(COMMON.max_exact_jitter * row_s)
 }
 
 /// Standard deviation of the errors of a log's stamps, seconds: of second differences, which even rows do not

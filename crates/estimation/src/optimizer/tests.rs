@@ -53,9 +53,9 @@ fn a_step_moves_the_model_and_headings_follow_it() {
 #[test]
 fn geometry_is_moved_by_a_half_at_most_and_headings_follow_the_step_as_it_was_taken() {
     let (model, headings, step, _) = taken(&[3.0, -3.0, 0.0, 0.0, 0.0]);
-    assert_eq!(step.as_slice(), &[MAX_GEOMETRY_STEP, -MAX_GEOMETRY_STEP, 0.0, 0.0, 0.0]);
-    assert!((model.m_per_rad.left / (0.08 * MAX_GEOMETRY_STEP.exp()) - 1.0).abs() < 1e-15);
-    assert_eq!(headings, [1.0, 2.25 + 0.5 * MAX_GEOMETRY_STEP + MAX_GEOMETRY_STEP]);
+    assert_eq!(step.as_slice(), &[COMMON.max_geometry_step, -COMMON.max_geometry_step, 0.0, 0.0, 0.0]);
+    assert!((model.m_per_rad.left / (0.08 * COMMON.max_geometry_step.exp()) - 1.0).abs() < 1e-15);
+    assert_eq!(headings, [1.0, 2.25 + 0.5 * COMMON.max_geometry_step + COMMON.max_geometry_step]);
     let (mut model, options) = (MODEL, FitOptions::of(&columns()));
     for number in [f64::NAN, f64::INFINITY] {
         let step = DVector::from_row_slice(&[0.0, 0.0, 0.0, number, 0.0]);
@@ -105,7 +105,7 @@ fn headings_follow_the_instruments_of_their_own_runs() {
 
 #[test]
 fn a_noise_step_is_cut_as_a_whole_and_ends_at_the_least_noise() {
-    let least = MIN_NOISE_SIGMA * MIN_NOISE_SIGMA;
+    let least = COMMON.min_noise_sigma * COMMON.min_noise_sigma;
     let of = |variance: [f64; 4], by: [f64; 4]| {
         let mut noise = Noise { variance, timing_s2: 0.0 };
         let moved = take_noise_step(&mut noise, Vector4::from(by));
@@ -117,9 +117,9 @@ fn a_noise_step_is_cut_as_a_whole_and_ends_at_the_least_noise() {
     assert!(variance.iter().zip(expected).all(|(found, on_paper)| close(*found, on_paper)), "{variance:?}");
     assert!((moved - Vector4::new(0.25, -0.25, 0.125, 0.0)).amax() < 1e-12);
     // Twice too long: all of it is halved, so that it keeps its direction.
-    let long = 2.0 * MAX_NOISE_STEP;
+    let long = 2.0 * COMMON.max_noise_step;
     let (_, moved) = of([1.0; 4], [long, -0.5 * long, 0.0, 0.25 * long]);
-    assert!((moved - Vector4::new(1.0, -0.5, 0.0, 0.25) * MAX_NOISE_STEP).amax() < 1e-12, "{moved}");
+    assert!((moved - Vector4::new(1.0, -0.5, 0.0, 0.25) * COMMON.max_noise_step).amax() < 1e-12, "{moved}");
     let (variance, moved) = of([2.0 * least, 1.0, 1.0, 1.0], [-1.0, 0.0, 0.0, 0.0]);
     assert!(variance[0] == least && (moved[0] + 2.0_f64.ln()).abs() < 1e-12, "{variance:?} {moved}");
 }

@@ -3,7 +3,7 @@
 use dataset::{Dataset, ExtraChannel, Odometry, RunInfo, TruthNoise, WheelLog};
 
 use super::*;
-use crate::settings::CHI_SQUARE_1_MEDIAN;
+use crate::settings::COMMON;
 
 /// A run whose rows have lengths, turns of both wheels since the row before, and a gyroscope's rates.
 fn run(rows: &[(f64, [f64; 2], f64)]) -> Run {
@@ -115,7 +115,7 @@ fn noise_of_standstills_is_half_of_the_mean_square_change_of_the_rate() {
     let on_paper = 0.04 / 12.5_f64.sqrt();
     assert!((found / on_paper - 1.0).abs() < 1e-9, "{found} {on_paper}");
     // A gyroscope without noise has the least there is; a log without one has none.
-    assert_eq!(of(vec![run(&standing(60, 0.0))]), Some(crate::settings::MIN_GYRO_NOISE_RAD_PER_SQRT_S));
+    assert_eq!(of(vec![run(&standing(60, 0.0))]), Some(PARTIAL.min_gyro_noise_rad_per_sqrt_s));
     let mut without = run(&standing(60, 0.02));
     without.odometry.extra.clear();
     assert_eq!(of(vec![without]), None);
@@ -137,7 +137,7 @@ fn noise_of_a_robot_that_hardly_stands_is_how_it_strays_from_the_wheels() {
     let moving = dataset(vec![run(&rows)]);
     let found = of(&moving.session()).noise_rad_per_sqrt_s.expect("it moves");
     // Every pair of windows of a second has the square 0.04²/2, of χ² with its median.
-    let on_paper = 0.04 / (2.0 * CHI_SQUARE_1_MEDIAN).sqrt();
+    let on_paper = 0.04 / (2.0 * COMMON.chi_square_1_median).sqrt();
     // Windows of sums of tenths are a second to 1e-14. Rejects rates that are not held against wheels.
     assert!((found / on_paper - 1.0).abs() < 1e-9, "{found} {on_paper}");
     let mut both = rows.clone();

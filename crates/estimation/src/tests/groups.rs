@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::*;
-use crate::settings::{EXTRINSICS_PRIOR_SIGMA_M, EXTRINSICS_PRIOR_SIGMA_RAD, LATENCY_PRIOR_SIGMA_S};
+use crate::settings::{COMMON, LATENCY_PRIOR_SIGMA_S};
 use crate::{GroupExtrinsics, Grouping, Information, Instrument, NormalEquations};
 
 const OWN: [Column; 4] = [Column::SensorX, Column::SensorY, Column::SensorTheta, Column::Latency];
@@ -33,7 +33,12 @@ fn an_instrument_of_its_own_follows_to_its_least_cost_and_the_cost_along_it_is_l
     let mut eliminated = equations.to_vec();
     let responses = extrinsics.eliminate(&mut eliminated, &model);
     assert_eq!(responses.len(), 2);
-    let sigma = [EXTRINSICS_PRIOR_SIGMA_M, EXTRINSICS_PRIOR_SIGMA_M, EXTRINSICS_PRIOR_SIGMA_RAD, LATENCY_PRIOR_SIGMA_S];
+    let sigma = [
+        COMMON.extrinsics_prior_sigma_m,
+        COMMON.extrinsics_prior_sigma_m,
+        COMMON.extrinsics_prior_sigma_rad,
+        LATENCY_PRIOR_SIGMA_S,
+    ];
     let precision = DVector::from_fn(4, |k, _| sigma[k].powi(-2));
     let offs = [[0.03, -0.06, 0.12, 0.02], [0.0; 4]];
     let step = DVector::from_row_slice(&[2e-3, -3e-3, 1e-3]);

@@ -173,15 +173,15 @@ fn a_hundred_steps_say_what_a_count_is_and_those_too_small_are_exact() {
     let of = |quantum_rad: f64, steps: usize| {
         quantum_of_angles(&by_counts(quantum_rad, [1.0, 2.0].into_iter().cycle().take(steps)))
     };
-    assert!((of(0.01, MIN_GRID_STEPS) - 0.01).abs() < 1e-12);
-    assert_eq!(of(0.01, MIN_GRID_STEPS - 1), 0.0);
+    assert!((of(0.01, COMMON.min_grid_steps) - 0.01).abs() < 1e-12);
+    assert_eq!(of(0.01, COMMON.min_grid_steps - 1), 0.0);
     // Rows at rest are no steps, nor is a file's rounding of a microradian.
     let with_rests: Vec<f64> =
-        (0..MIN_GRID_STEPS - 1).flat_map(|step| [0.0, 0.0, 1e-6].map(|by| 0.01 * step as f64 + by)).collect();
+        (0..COMMON.min_grid_steps - 1).flat_map(|step| [0.0, 0.0, 1e-6].map(|by| 0.01 * step as f64 + by)).collect();
     assert_eq!(quantum_of_angles(&with_rests), 0.0);
     // 3e-5 rad and less are as good as exact. Rejects a limit on one of both alone.
-    assert_eq!(of(2.5e-5, 3 * MIN_GRID_STEPS), 0.0);
-    assert!((of(3.5e-5, 3 * MIN_GRID_STEPS) - 3.5e-5).abs() < 1e-12);
+    assert_eq!(of(2.5e-5, 3 * COMMON.min_grid_steps), 0.0);
+    assert!((of(3.5e-5, 3 * COMMON.min_grid_steps) - 3.5e-5).abs() < 1e-12);
 }
 
 #[test]
@@ -225,8 +225,9 @@ fn a_rates_noise_counts_against_what_is_left_of_its_variance() {
     let alike = [vec![1.0, -1.0, 1.0, -1.0], vec![1.0, -1.0, 1.0, -1.0]];
     let opposite = [vec![1.0, -1.0, 1.0, -1.0], vec![-1.0, 1.0, -1.0, 1.0]];
     let both = [vec![1.0, -1.0, 1.0, -1.0], vec![1.0, 1.0, -1.0, -1.0]];
-    let is_below =
-        |rates: &[Vec<f64>; 2], noise: f64| is_below_signal(rates, [noise; 2], RATE_NOISE_FRACTION, 0.4, [0.1; 2]);
+    let is_below = |rates: &[Vec<f64>; 2], noise: f64| {
+        is_below_signal(rates, [noise; 2], WHEEL_RATES.rate_noise_fraction, 0.4, [0.1; 2])
+    };
     // Neither a robot that only drives nor one that only turns has a signal in both.
     assert!(!is_below(&alike, 1e-6) && !is_below(&opposite, 1e-6));
     // Of independent wheels the centre has the variance ½ · 0.01 and, of noise n, ½ · 0.01 n: a tenth of
