@@ -346,7 +346,7 @@ impl<'f, 'a> Filter<'f, 'a> {
         rounding.pass(&mut state, noise_score);
     }
 
-    /// The innovation of a measurement after so many intervals; the pose has a heading of this sine and cosine.
+    /// The innovation of a measurement after so many intervals, at a heading of this sine and cosine.
     #[inline(always)]
     fn innovation(&self, measured: &MeasuredPose, after: usize, twist: Twist, (sin, cos): (f64, f64)) -> Innovation {
         let Instrument { body_from_sensor: Pose { x_m: lx, y_m: ly, theta_rad: ltheta }, latency_s: late } =

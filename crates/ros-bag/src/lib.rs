@@ -2,11 +2,11 @@
 //!
 //! The order of work, a file each: `bag` which files → `mcap_file` records and chunks (`record_fields`,
 //! `decompress`, `resync`), `sqlite_file` rows of tables (`sqlite_tables`, `sqlite_pages`), `ros1_file`
-//! records of ROS 1 → `definition` (`known_types`) and `cdr` messages (`value`) → `topics` what the bag
-//! holds → `choice` which two topics → `rows` of them by `wheels` (`wheel_pair` where each has its topic),
-//! `truth` (`frame_chain` of its `transform`s) and `gyro` → `clock` their times → `gyro_column` → `assembly`
-//! the dataset (`recorded` when) → `import` of an `open_bag`, `took` of what. Scans of a lidar (`laser_scan`) become
-//! walls in a second pass, `scan_walls`: `wall_line` finds them, `wall_tracks` follows them by the
+//! records of ROS 1 → `definition` (`known_types`) and `cdr` messages (`value`) → `topics` what the bag holds
+//! → `choice` which two topics → `rows` of them by `wheels` (`wheel_pair` where each has its topic), `truth`
+//! (`frame_chain` of its `transform`s) and `gyro` → `clock` their times → `gyro_column` → `assembly` the
+//! dataset (`recorded` when) → `import` of an `open_bag`, `took` of what. Scans of a lidar (`laser_scan`)
+//! become walls in a second pass, `scan_walls`: `wall_line` finds them, `wall_tracks` follows them by the
 //! `nominal_path`, `static_frames` says where the lidar stands. Every limit stands in `settings`. `listing`
 //! shows the topics. `recorder` writes a dataset's runs as a bag, of `messages` by `cdr_writer`.
 

@@ -251,8 +251,8 @@ fn is_needed(quantity: Quantity, roles: &Roles) -> bool {
     }
 }
 
-/// Takes the nanoseconds out of the columns of time: for what they are, or, where the seconds next to them are
-/// not the time, among what is left out.
+/// Takes the nanoseconds out of the columns of time: for what they are, or, where the seconds next to them
+/// are not the time, among what is left out.
 fn take_nanoseconds(
     sheet: &Sheet,
     by_name: &mut BTreeMap<Quantity, Vec<(usize, NameReading)>>,
