@@ -8,10 +8,9 @@ use rules::Rule;
 use crate::candidates::candidate::{Candidate, mean_terms};
 use crate::findings::extrinsics;
 use crate::options::Options;
-use crate::records::prepared::{BeforeFit, Prepared};
+use crate::records::prepared::Prepared;
 use crate::records::record_faults::{determines_wheels, faults, is_correlated, rejected_share, sessions};
 use crate::records::stamp_errors::{StampError, stamp_error, whole_stamp_error, with_rows_of};
-use crate::records::unknown_motion::AnomalyKind;
 use crate::report::{AsStamped, Diagnosis, EVERY_MEASUREMENT, Explained, Log};
 use crate::search::mean_structure::{MeanStructure, THINNED, mean_structure};
 use crate::settings::RECORDS;
@@ -65,57 +64,23 @@ pub enum DiagnoseError {
 /// [`DiagnoseError`] when an id is unknown or no base model can be fitted.
 pub fn diagnose<'l>(log: impl Into<Log<'l>>, options: &Options) -> Result<Diagnosis, DiagnoseError> {
     let log = log.into();
-    if let Some(id) = options.without.iter().find(|id| !CATALOGUE.contains(&id.as_str())) {
-        return Err(DiagnoseError::UnknownEffect { id: id.clone() });
-    }
-    let runs = log.datasets.iter().map(|dataset| dataset.runs.len()).sum();
-    if runs > MAX_RUNS {
-        return Err(DiagnoseError::TooManyRuns { runs });
-    }
-    let stages = |before_fit: BeforeFit| stages(log, options, before_fit);
-    let mut before_fit = BeforeFit { min_common_clock_s: RECORDS.min_common_clock_offset_s, events: true };
-    let first = match stages(before_fit) {
-        // To an instrument that is precise, a clock that is off by less makes most measurements outliers.
-        Err(DiagnoseError::OdometryUncorrelated { .. }) if Rule::ClockRetry.applies(true) => {
-            before_fit.min_common_clock_s = RECORDS.min_rejecting_clock_offset_s;
-            stages(before_fit)?
-        }
-        result => result?,
-    };
-    if first.has_events
-        && let Ok(whole) = stages(BeforeFit { events: false, ..before_fit })
-        && Rule::WholeWithoutEvents.applies(whole.explains_events_of(&first))
-    {
-        return Ok(whole.diagnosis);
-    }
-    Ok(first.diagnosis)
-}
-
-/// What the stages come to.
-struct Staged {
-    diagnosis: Diagnosis,
-    /// Nothing is compared across some intervals in which the robot may have moved.
-    has_events: bool,
-    /// Share of the measurements that are outliers beside all that was found.
-    outlier_share: f64,
-}
-
-impl Staged {
-    /// Whether what was found with all intervals compared explains what happened in those of another: as a
-    /// castor turns a robot wherever it reverses. Where it does not, what follows an event are outliers.
-    fn explains_events_of(&self, cut: &Self) -> bool {
-        !self.diagnosis.found.candidates.is_empty() && self.outlier_share <= cut.outlier_share
-    }
-}
-
-fn stages(log: Log<'_>, options: &Options, before_fit: BeforeFit) -> Result<Staged, DiagnoseError> {
+    refuse(log, options)?;
     let begins = |step| options.on_stage.begins(step);
     begins(Step::Motions);
     let every_term = mean_terms(&options.without);
-    let prepared = Prepared::of(log.datasets, &every_term, before_fit);
+    let prepared = Prepared::of(log.datasets, &every_term, RECORDS.min_common_clock_offset_s);
     begins(Step::RecordFaults);
     let as_recorded = EVERY_MEASUREMENT.fit(&sessions(prepared.records()));
     let faults = faults(prepared.records(), as_recorded.as_ref().ok(), &options.without)?;
+    // To an instrument that is precise, a clock that is off by less makes most measurements outliers.
+    let retries = faults.is_empty()
+        && Rule::ClockRetry.applies(as_recorded.as_ref().is_ok_and(has_most_rejected))
+        && !prepared.has_clock();
+    let again = retries.then(|| Prepared::of(log.datasets, &every_term, RECORDS.min_rejecting_clock_offset_s));
+    let (prepared, as_recorded) = match &again {
+        Some(again) => (again, EVERY_MEASUREMENT.fit(&sessions(again.records()))),
+        None => (&prepared, as_recorded),
+    };
     let (records, base) = match faults.last() {
         None => (prepared.records(), as_recorded?),
         Some(fault) => (&fault.records[..], EVERY_MEASUREMENT.fit(&sessions(&fault.records))?),
@@ -146,20 +111,22 @@ fn stages(log: Log<'_>, options: &Options, before_fit: BeforeFit) -> Result<Stag
         catalogue.clear();
         structure = mean_structure(records, structure.base, &catalogue);
     }
-    let explained = Explained {
-        log,
-        prepared: &prepared,
-        faults: &faults,
-        stamps,
-        as_stamped,
-        records,
-        structure,
-        catalogue,
-        uncorrelated,
-    };
-    let has_events = prepared.anomalies().iter().any(|anomaly| anomaly.kind == AnomalyKind::RobotOrFrame);
-    let outlier_share = rejected_share(&explained.structure.model().fit);
-    Ok(Staged { has_events, outlier_share, diagnosis: explained.diagnosis(options) })
+    let faults = &faults[..];
+    Ok(Explained { log, prepared, faults, stamps, as_stamped, records, structure, catalogue, uncorrelated }
+        .diagnosis(options))
+}
+
+/// An id that is none, and more runs than a diagnosis is of.
+fn refuse(log: Log<'_>, options: &Options) -> Result<(), DiagnoseError> {
+    if let Some(id) = options.without.iter().find(|id| !CATALOGUE.contains(&id.as_str())) {
+        return Err(DiagnoseError::UnknownEffect { id: id.clone() });
+    }
+    let runs = log.datasets.iter().map(|dataset| dataset.runs.len()).sum();
+    if runs > MAX_RUNS { Err(DiagnoseError::TooManyRuns { runs }) } else { Ok(()) }
+}
+
+fn has_most_rejected(fit: &ModelFit<'_>) -> bool {
+    rejected_share(fit) > RECORDS.max_rejected_fraction
 }
 
 /// Whether the odometry is uncorrelated with what the instrument measured; an error where nothing can be said.

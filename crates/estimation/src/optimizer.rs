@@ -139,10 +139,6 @@ struct Fit<'f, 'r> {
 }
 
 impl Fit<'_, '_> {
-    fn pass(&self, terms: &mut [Box<dyn ModelTerm>], pass_options: PassOptions<'_>) -> Pass {
-        pass(self.records, self.selections, &self.model, &self.noise, &self.headings, terms, pass_options)
-    }
-
     fn noise_step(&self, found: &Pass) -> NoiseStep {
         if self.options.noise_fixed {
             return NoiseStep::none();
@@ -159,7 +155,8 @@ impl Fit<'_, '_> {
             let noise_score = self.records.is_partial() && !options.noise_fixed;
             let (gate, free) = (OutlierGate::Off, Some(&options.columns[..]));
             let pass_options = PassOptions { innovations: true, noise_score, gate, free, ..PassOptions::default() };
-            let found = self.pass(terms, pass_options);
+            let Self { records, selections, model, noise, headings, .. } = &*self;
+            let found = pass(records, selections, model, noise, headings, terms, pass_options);
             let mean = MeanStep::of(&found, options, &self.basis)?;
             let (_, own) = take_step(&mut self.model, &mut self.headings, &found, options, mean.by)?;
             let moved = mean.squared + own;
@@ -221,7 +218,8 @@ pub(crate) fn fit_from(
     for step in 0..options.max_steps {
         damping.only_shorter = 2 * step >= options.max_steps;
         let by_cached = PassOptions { keep: keep && cached.is_none(), by: cached.as_ref(), ..pass_options };
-        let mut found = fit.pass(terms, by_cached);
+        let Fit { model, noise, headings, .. } = &fit;
+        let mut found = pass(records, selections, model, noise, headings, terms, by_cached);
         let mean = MeanStep::of(&found, options, &fit.basis)?;
         let of_noise = fit.noise_step(&found);
         let columns = options.columns.len();
@@ -270,7 +268,8 @@ pub(crate) fn fit_from(
         by,
         ..PassOptions::default()
     };
-    let pass = fit.pass(terms, pass_options);
+    let Fit { model, noise, headings, .. } = &fit;
+    let pass = pass(records, selections, model, noise, headings, terms, pass_options);
     let Fit { model, noise, headings, .. } = fit;
     Ok(Solution { model, noise, free_headings: headings, pass, converged: converged || is_near, left_basin })
 }

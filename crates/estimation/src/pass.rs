@@ -268,55 +268,45 @@ impl SegmentFilter<'_, '_> {
                 }
                 found
             };
-            runs.iter().zip(equations).zip(&phase.repetitions).map(in_run).collect()
-        } else if at_once {
-            // Segments of a run follow each other, as terms have a state; each run starts anew.
-            let in_run = |terms: &mut Vec<Box<dyn ModelTerm>>, (run, equations): (usize, &mut NormalEquations)| {
-                self.filter_run(phase, run, equations, terms)
-            };
-            equations.par_iter_mut().enumerate().map_init(|| terms.to_vec(), in_run).collect()
-        } else {
-            let in_run = |(run, equations)| self.filter_run(phase, run, equations, terms);
-            equations.iter_mut().enumerate().map(in_run).collect()
+            return runs.iter().zip(equations).zip(&phase.repetitions).map(in_run).collect();
         }
-    }
-
-    /// Filters the segments of a run, one after the other.
-    fn filter_run(
-        &self,
-        phase: &Phase<'_>,
-        run: usize,
-        equations: &mut NormalEquations,
-        terms: &mut Terms,
-    ) -> Vec<FilteredSegment> {
-        let mut carried: Option<CarriedState> = None;
-        let segments = &self.runs[run];
-        let (mut found, mut summands) = (Vec::with_capacity(segments.len()), Vec::new());
-        if phase.repeated[run].is_some() {
-            return found;
-        }
-        for number in segments.clone() {
-            let unobservable = phase.propagations[number].is_empty();
-            // The state of terms, and what samples hold, go on over displacements that are not taken.
-            let remember = self.has_memory && self.pass_options.by.is_none();
-            if unobservable && (!remember || self.records.segments[number].start == Start::MeasuredPose) {
-                continue;
+        // Segments of a run follow each other, as terms have a state; each run starts anew.
+        let in_run = |terms: &mut Terms, (run, equations): (usize, &mut NormalEquations)| {
+            let mut carried: Option<CarriedState> = None;
+            let (mut found, mut summands) = (Vec::with_capacity(runs[run].len()), Vec::new());
+            if phase.repeated[run].is_some() {
+                return found;
             }
-            let (summand, filtered) = self.filter_segment(phase, number, terms, &mut carried);
-            if !unobservable {
+            for number in runs[run].clone() {
+                let unobservable = phase.propagations[number].is_empty();
+                // The state of terms, and what samples hold, go on over displacements that are not taken.
+                let remember = self.has_memory && self.pass_options.by.is_none();
+                if unobservable && (!remember || self.records.segments[number].start == Start::MeasuredPose) {
+                    continue;
+                }
+                let (summand, filtered) = self.filter_segment(phase, number, terms, &mut carried);
+                if unobservable {
+                    continue;
+                }
                 // Those of many displacements are large: kept only where they are repeated.
                 if phase.repetitions[run] == 1 {
-                    equations.add(&summand, self.weight);
+                    equations.add(&summand, *weight);
                 } else {
                     summands.push(summand);
                 }
                 found.push(filtered);
             }
+            for _ in 0..phase.repetitions[run] {
+                summands.iter().for_each(|summand| equations.add(summand, *weight));
+            }
+            found
+        };
+        if at_once {
+            let each = equations.par_iter_mut().enumerate();
+            each.map_init(|| terms.to_vec(), |terms, run| in_run(terms, run)).collect()
+        } else {
+            equations.iter_mut().enumerate().map(|run| in_run(terms, run)).collect()
         }
-        for _ in 0..phase.repetitions[run] {
-            summands.iter().for_each(|summand| equations.add(summand, self.weight));
-        }
-        found
     }
 
     /// Filters a segment: its normal equation, and what else it gives.

@@ -12,15 +12,6 @@ use crate::records::clock_profile::RunClock;
 use crate::records::stamp_errors::{StampError, stamp_error_by_counts, uncertain_tick_s};
 use crate::records::unknown_motion::{Anomaly, UnknownMotions, unknown_motions};
 
-/// What is taken off the records before the fit.
-#[derive(Clone, Copy)]
-pub(crate) struct BeforeFit {
-    /// An offset of all clocks from so many seconds on.
-    pub(crate) min_common_clock_s: f64,
-    /// Intervals in which robot or frame moved as no wheel says.
-    pub(crate) events: bool,
-}
-
 /// The records with what was set right in them, step after step.
 pub(crate) struct Prepared<'d> {
     recorded: &'d [Dataset],
@@ -34,9 +25,8 @@ pub(crate) struct Prepared<'d> {
 }
 
 impl<'d> Prepared<'d> {
-    /// Of records as they were read.
-    pub(crate) fn of(recorded: &'d [Dataset], every_term: &[Candidate], before_fit: BeforeFit) -> Self {
-        let BeforeFit { min_common_clock_s, events } = before_fit;
+    /// Of records as they were read. An offset of all clocks is taken off from so many seconds on.
+    pub(crate) fn of(recorded: &'d [Dataset], every_term: &[Candidate], min_common_clock_s: f64) -> Self {
         // The sampling periods of all runs, on all cores: whoever asks for them later asks run by run.
         recorded.par_iter().flat_map(|dataset| &dataset.runs).for_each(|run| {
             let _ = run.odometry.t_s.sampling_period();
@@ -51,7 +41,7 @@ impl<'d> Prepared<'d> {
         };
         let clocks = clock_offsets(datasets, of_runs, min_common_clock_s);
         let datasets = clocks.records.as_deref().unwrap_or(datasets);
-        let odd = unknown_motions(datasets, clocks.remaining_s, uncertain_tick_s(recorded), events);
+        let odd = unknown_motions(datasets, clocks.remaining_s, uncertain_tick_s(recorded));
         Self { recorded, by_counts, drift, clocks, odd }
     }
 
@@ -61,6 +51,11 @@ impl<'d> Prepared<'d> {
         let drift = self.drift.as_ref().map(|drift| &drift.records[..]);
         let by_counts = self.by_counts.as_ref().map(|error| &error.records[..]);
         odd.or(self.clocks.records.as_deref()).or(drift).or(by_counts).unwrap_or(self.recorded)
+    }
+
+    /// Whether a clock was set right.
+    pub(crate) fn has_clock(&self) -> bool {
+        self.drift.is_some() || !self.clocks.offsets.is_empty()
     }
 
     /// Runs and intervals that do not belong.

@@ -80,50 +80,47 @@ pub(crate) fn mean_structure<'a>(
     base: ModelFit<'a>,
     catalogue: &[Candidate],
 ) -> MeanStructure<'a> {
-    let Searched { base, model, correlated } = match correlation_by_part(datasets, &base, catalogue) {
+    let (mut searched, mut correlated) = match correlation_by_part(datasets, &base, catalogue) {
         Some(correlation) => {
             let whole = base.clone().without_innovations(); // most of its memory
             match thinned(datasets, base) {
-                Some(thinned) => search_thinned(thinned, correlation, catalogue),
-                None => search_and_thin(datasets, whole.with_innovations(&mut []).into_owned(), catalogue),
+                Some(thinned) => (search_among_all(thinned, catalogue), Some(correlation)),
+                None => (search_among_all(whole.with_innovations(&mut []).into_owned(), catalogue), None),
             }
         }
-        None => search_and_thin(datasets, base, catalogue),
+        None => (search_among_all(base, catalogue), None),
     };
+    if correlated.is_none()
+        && let Some((thinned, correlation)) = searched.thinned_if_correlated(datasets)
+    {
+        drop(searched); // its fits are large
+        searched = search_among_all(thinned, catalogue);
+        correlated = Some(correlation);
+    }
+    let Searched { base, model } = searched;
     let model = terms_if_dependent(&base, search_if_dependent(model, catalogue));
     let MeanModel { found, unlisted, checked, competing } = model;
     MeanStructure { base, found, checked, unlisted, correlated, competing }
 }
 
-/// A base fit and the model that was found with it; `correlated` as in [`MeanStructure`].
+/// A base fit, and the model that was found with it.
 struct Searched<'a> {
     base: ModelFit<'a>,
     model: MeanModel<'a>,
-    correlated: Option<(f64, f64)>,
 }
 
-/// A search among all measurements, and another one among thinned ones where the residuals stay
-/// autocorrelated.
-fn search_and_thin<'a>(datasets: &'a [Dataset], base: ModelFit<'a>, catalogue: &[Candidate]) -> Searched<'a> {
-    let among_all = search_among_all(base, catalogue);
-    let lasting = among_all.lasting_correlation().filter(|_| Rule::ThinIfAutocorrelated.applies(true));
-    let thinned = lasting
-        .and_then(|lasting| Some((thinned_beside(datasets, &among_all.base, &among_all.model.found.model)?, lasting)));
-    match thinned {
-        Some((thinned, correlation)) => {
-            drop(among_all); // its fits are large
-            search_thinned(thinned, correlation, catalogue)
-        }
-        None => among_all,
-    }
-}
-
-impl Searched<'_> {
+impl<'a> Searched<'a> {
     /// The autocorrelation that is left with what was found: coefficient, and standard errors.
     /// Autocorrelated measurements taken as independent make any effect too significant.
     fn lasting_correlation(&self) -> Option<(f64, f64)> {
         let lasts = self.model.unlisted.is_none() && !is_white(&self.model.checked);
         lasts.then_some(self.model.checked.correlation)
+    }
+
+    /// The base fit to thinned measurements, where all are autocorrelated, and by how much they are.
+    fn thinned_if_correlated(&self, datasets: &'a [Dataset]) -> Option<(ModelFit<'a>, (f64, f64))> {
+        let correlation = self.lasting_correlation().filter(|_| Rule::ThinIfAutocorrelated.applies(true))?;
+        Some((thinned_beside(datasets, &self.base, &self.model.found.model)?, correlation))
     }
 }
 
@@ -141,12 +138,7 @@ fn search_among_all<'a>(base: ModelFit<'a>, catalogue: &[Candidate]) -> Searched
         }
     };
     let model = compare_with_sparse(&base, MeanModel::of_effects(found));
-    Searched { base, model, correlated: None }
-}
-
-/// The search among thinned measurements, whose autocorrelation this was before.
-fn search_thinned<'a>(thinned: ModelFit<'a>, correlation: (f64, f64), catalogue: &[Candidate]) -> Searched<'a> {
-    Searched { correlated: Some(correlation), ..search_among_all(thinned, catalogue) }
+    Searched { base, model }
 }
 
 /// A base fit, thinned until what it leaves is white.

@@ -3,11 +3,12 @@
 use effects::{Channel, Covariate, Sparse};
 use estimation::ModelFit;
 use kinematics::Side;
+use rayon::prelude::*;
 
 use crate::candidates::candidate::Candidate;
 use crate::candidates::covariates::{of_cycles, of_runs};
 use crate::findings::geometry_deviations::keeps_wheels;
-use crate::fits::augmented_model::{AugmentedModel, refit, refit_each};
+use crate::fits::augmented_model::{AugmentedModel, refit};
 use crate::fits::cancellation::effects_cancel;
 use crate::fits::model_comparison::{form_error_statistic, log_bayes_factor};
 use crate::fits::null_distribution::NullDistribution;
@@ -182,11 +183,13 @@ impl<'m, 'a> SparseSearch<'m, 'a> {
             refit(base, model, [&model.candidates[..], std::slice::from_ref(&scored.candidate)].concat())
                 .filter(|extended| keeps_wheels(&model.fit, &extended.fit) && !effects_cancel(extended))
         };
+        let best = SEARCH.max_sparse_refits.min(trials);
+        let few = |few: &[Scored]| few.par_iter().filter_map(with).collect::<Vec<_>>();
         Some(Self {
             model,
             p_value,
             trials,
-            refitted: refit_each(&scored[..SEARCH.max_sparse_refits.min(trials)], with),
+            refitted: scored[..best].chunks(SEARCH.max_fits_at_a_time).flat_map(few).collect(),
         })
     }
 
