@@ -7,6 +7,7 @@
 
 mod arrows;
 mod commands;
+mod depth;
 mod documents;
 mod effect_ids;
 mod english;

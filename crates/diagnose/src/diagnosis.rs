@@ -8,10 +8,12 @@ use rules::Rule;
 use crate::candidates::candidate::{Candidate, mean_terms};
 use crate::findings::extrinsics;
 use crate::options::Options;
+use crate::records::log::Log;
 use crate::records::prepared::Prepared;
 use crate::records::record_faults::{determines_wheels, faults, is_correlated, rejected_share, sessions};
 use crate::records::stamp_errors::{StampError, stamp_error, whole_stamp_error, with_rows_of};
-use crate::report::{AsStamped, Diagnosis, EVERY_MEASUREMENT, Explained, Log};
+use crate::records::unknown_motion::AnomalyKind;
+use crate::report::{AsStamped, Diagnosis, EVERY_MEASUREMENT, Explained};
 use crate::search::mean_structure::{MeanStructure, THINNED, mean_structure};
 use crate::settings::RECORDS;
 use crate::settings::large_log::MAX_RUNS;
@@ -68,7 +70,7 @@ pub fn diagnose<'l>(log: impl Into<Log<'l>>, options: &Options) -> Result<Diagno
     let begins = |step| options.on_stage.begins(step);
     begins(Step::Motions);
     let every_term = mean_terms(&options.without);
-    let prepared = Prepared::of(log.datasets, &every_term, RECORDS.min_common_clock_offset_s);
+    let prepared = Prepared::of(log, &every_term, RECORDS.min_common_clock_offset_s);
     begins(Step::RecordFaults);
     let as_recorded = EVERY_MEASUREMENT.fit(&sessions(prepared.records()));
     let faults = faults(prepared.records(), as_recorded.as_ref().ok(), &options.without)?;
@@ -76,7 +78,7 @@ pub fn diagnose<'l>(log: impl Into<Log<'l>>, options: &Options) -> Result<Diagno
     let retries = faults.is_empty()
         && Rule::ClockRetry.applies(as_recorded.as_ref().is_ok_and(has_most_rejected))
         && !prepared.has_clock();
-    let again = retries.then(|| Prepared::of(log.datasets, &every_term, RECORDS.min_rejecting_clock_offset_s));
+    let again = retries.then(|| Prepared::of(log, &every_term, RECORDS.min_rejecting_clock_offset_s));
     let (prepared, as_recorded) = match &again {
         Some(again) => (again, EVERY_MEASUREMENT.fit(&sessions(again.records()))),
         None => (&prepared, as_recorded),
@@ -112,8 +114,18 @@ pub fn diagnose<'l>(log: impl Into<Log<'l>>, options: &Options) -> Result<Diagno
         structure = mean_structure(records, structure.base, &catalogue);
     }
     let faults = &faults[..];
-    Ok(Explained { log, prepared, faults, stamps, as_stamped, records, structure, catalogue, uncorrelated }
-        .diagnosis(options))
+    let explained =
+        Explained { log, prepared, faults, stamps, as_stamped, records, structure, catalogue, uncorrelated };
+    let found = explained.diagnosis(options);
+    // Where something happened that no wheel says, the same with nothing cut.
+    let has_events = prepared.anomalies().iter().any(|anomaly| anomaly.kind == AnomalyKind::RobotOrFrame);
+    if has_events
+        && let Ok(whole) = diagnose(Log { cuts_events: false, ..log }, options)
+        && Rule::WholeWithoutEvents.applies(whole.explains_events_of(&found))
+    {
+        return Ok(whole);
+    }
+    Ok(found)
 }
 
 /// An id that is none, and more runs than a diagnosis is of.

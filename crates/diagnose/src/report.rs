@@ -21,11 +21,11 @@ use crate::gain::extended_scenario::scenario_of;
 use crate::gain::{gain_by_level, held_out_drift};
 use crate::options::Options;
 use crate::plan::next_experiment;
-use crate::records::large_log::LargeLog;
+use crate::records::log::Log;
 use crate::records::log_rows::{check_rows, check_spans};
 use crate::records::names::session_names;
 use crate::records::prepared::Prepared;
-use crate::records::record_faults::{Fault, sessions};
+use crate::records::record_faults::{Fault, rejected_share, sessions};
 use crate::records::stamp_errors::StampError;
 use crate::search::mean_structure::{MeanStructure, THINNED};
 use crate::stage::Step;
@@ -55,6 +55,8 @@ pub struct Diagnosis {
     /// The geometry that suits these data best where none of the robot's own effects can be expressed: fitted
     /// beside what was found of the instrument alone. `None` where faults of the records were undone first.
     pub geometry_alone: Option<CalibrationReport>,
+    /// Share of the measurements that are outliers with all that was found.
+    pub(crate) outlier_share: f64,
 }
 
 /// A model with its terms, to be compared with other records.
@@ -63,6 +65,15 @@ pub struct FittedModel {
     /// Geometry, and values in the order of the terms' parameters.
     pub model: estimation::Model,
     pub(crate) candidates: Vec<Candidate>,
+}
+
+impl Diagnosis {
+    /// Whether what was found with all intervals compared explains what happened in those that another
+    /// diagnosis cuts: as a castor turns a robot wherever it reverses. Where it does not, what follows an event
+    /// are outliers.
+    pub(crate) fn explains_events_of(&self, cut: &Self) -> bool {
+        !self.found.candidates.is_empty() && self.outlier_share <= cut.outlier_share
+    }
 }
 
 impl FittedModel {
@@ -74,37 +85,6 @@ impl FittedModel {
     #[must_use]
     pub fn terms(&self) -> Vec<Box<dyn model_term::ModelTerm>> {
         crate::candidates::candidate::terms(&self.candidates)
-    }
-}
-
-/// A log as it is diagnosed: its datasets, and the large log whose stretches they are.
-#[derive(Debug, Clone, Copy)]
-pub struct Log<'l> {
-    pub(crate) datasets: &'l [Dataset],
-    pub(crate) large: Option<&'l LargeLog>,
-}
-
-impl<'l> From<&'l [Dataset]> for Log<'l> {
-    fn from(datasets: &'l [Dataset]) -> Self {
-        Self { datasets, large: None }
-    }
-}
-
-impl<'l> From<&'l Vec<Dataset>> for Log<'l> {
-    fn from(datasets: &'l Vec<Dataset>) -> Self {
-        Self::from(&datasets[..])
-    }
-}
-
-impl<'l, const N: usize> From<&'l [Dataset; N]> for Log<'l> {
-    fn from(datasets: &'l [Dataset; N]) -> Self {
-        Self::from(&datasets[..])
-    }
-}
-
-impl<'l> From<&'l LargeLog> for Log<'l> {
-    fn from(log: &'l LargeLog) -> Self {
-        Self { datasets: log.datasets(), large: Some(log) }
     }
 }
 
@@ -240,6 +220,7 @@ impl<'a> Explained<'_, 'a> {
             calibrated: FittedModel::of(&calibrated),
             found: FittedModel::of(model),
             carried: FittedModel::of(&carried),
+            outlier_share: rejected_share(&model.fit),
             geometry_alone: self.faults.is_empty().then(|| report_of(&of_instrument)),
         }
     }

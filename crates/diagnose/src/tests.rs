@@ -7,7 +7,7 @@ use dataset::{Dataset, Run, TruthSample, WheelLog};
 use estimation::{Model, ModelFit, Noise};
 use kinematics::Wheels;
 
-use crate::candidates::candidate::mean_terms;
+use crate::candidates::candidate::{Candidate, mean_terms};
 use crate::candidates::physical::is_physical;
 use crate::checks::residual_tests::{check, residual_persistence};
 use crate::checks::residuals::residuals;
@@ -27,6 +27,9 @@ use crate::gain::extended_scenario::SamplingStatistics;
 use crate::gain::gain_by_level;
 use crate::records::part_of_runs::part_of_runs;
 use crate::records::record_faults::sessions;
+use crate::search::selection::{search, search_ungated};
+use crate::search::sparse_terms::SparseSearch;
+use crate::settings::LEVELS;
 use crate::small_robot::{assert_unmoved, effect, fitted, session, with_effects};
 use crate::{Options, diagnose};
 
@@ -230,4 +233,36 @@ fn a_log_of_numbers_that_are_none_has_no_diagnosis() {
         }
     }
     assert!(diagnosed.is_empty(), "{diagnosed:#?}");
+}
+
+/// A robot whose wheels turn by two centimetres on the spot as they reverse, once in a run.
+fn with_backlash() -> Dataset {
+    let mut dataset = session(0, 0.0);
+    for run in &mut dataset.runs {
+        let WheelLog::Angles(angles) = &mut run.odometry.wheels else { panic!("angles are logged") };
+        for side in [&mut angles.left, &mut angles.right] {
+            let lost_rad = (0.02 / 0.08_f64).copysign(side[120] - side[110]);
+            side[101..].iter_mut().for_each(|rad| *rad += lost_rad);
+        }
+    }
+    dataset
+}
+
+#[test]
+fn regress_no_number_of_an_ungated_search_moves() {
+    let datasets = [with_backlash()];
+    let base = fitted(&datasets);
+    let open = base.refit_ungated().expect("all poses are taken");
+    let catalogue: Vec<Candidate> = ["backlash", "truth_latency", "slip_speed"].map(effect).to_vec();
+    // Nothing was found among the measurements that the gate leaves.
+    let found = search(FitCache::of(&base), &[], LEVELS.scan_level);
+    let bold = search(FitCache::of(&open), &catalogue, LEVELS.scan_level);
+    let bold = (bold.model.candidates, bold.tests, bold.refusals);
+    let ungated = search_ungated(&found, &catalogue);
+    let all = ungated.map(|of| (of.model.candidates, of.tests, of.refusals));
+    let alone = AugmentedModel::base(&base);
+    let term = SparseSearch::beside(1.0, &base, &alone);
+    let best = term.as_ref().and_then(|of| of.best_prediction(1.0)).map(|of| (of.p_value, of.trials, of.certain));
+    let outliers = base.solution.pass.outliers.len();
+    assert_unmoved("ungated.txt", &format!("{outliers} outliers\n{bold:#?}\n{all:#?}\n{best:?}\n"));
 }

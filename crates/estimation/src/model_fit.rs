@@ -331,12 +331,35 @@ impl ModelFit<'_> {
         OutlierGate::of(self.ungated)
     }
 
+    /// The fit to every measurement, outliers too. A large effect that shows in few measurements makes
+    /// outliers of these, and is lost without them. Where measurements have gross errors of their own, it is
+    /// a worse fit. It has no innovations, which [`Self::with_innovations`] finds.
+    ///
+    /// # Errors
+    /// [`EstimationError`] when it diverges.
+    pub fn refit_ungated(&self) -> Result<Self, EstimationError> {
+        let mut ungated_fit = Self { ungated: true, ..self.clone() };
+        let options = FitOptions { innovations: false, ..ungated_fit.fit_options() };
+        ungated_fit.refit_by(&options, None, &mut [])?;
+        Ok(ungated_fit)
+    }
+
     /// The values found, evaluated on every measurement of the first phase, outliers too; nothing is fitted
     /// again.
     #[must_use]
     pub fn evaluated_ungated(&self) -> Self {
         let first = self.selections.iter().take(1).cloned().collect();
         Self { ungated: true, selections: Arc::new(first), ..self.clone() }
+    }
+
+    /// The same fit with outliers rejected. `terms` are those of the fit.
+    ///
+    /// # Errors
+    /// [`EstimationError`] when it diverges.
+    pub fn refit_gated(&self, terms: &mut [Box<dyn ModelTerm>]) -> Result<Self, EstimationError> {
+        let mut gated = Self { ungated: false, ..self.clone() };
+        gated.refit(Some(self.current_values()), terms)?;
+        Ok(gated)
     }
 
     /// The normal equations of the same pass for terms that are tested one by one: the last parameters come

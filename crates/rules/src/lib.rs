@@ -39,6 +39,8 @@ rules! {
     UnknownMotions,
     /// Contamination: runs with another mounting of the instrument are left out.
     OtherExtrinsics,
+    /// Contamination: what was found with all intervals compared is taken where it explains the others' events.
+    WholeWithoutEvents,
     /// Records: a fault of the records is undone.
     RecordFault,
     /// Records: a second fault is sought after the first.
@@ -59,12 +61,18 @@ rules! {
     AutocorrelationByPart,
     /// Thinning: the spacing goes by what is left with the effects that were found.
     ThinnedBesideEffects,
+    /// Outliers: a search without the gate, where there are more outliers than the noise makes.
+    UngatedSearch,
     /// Noise of instants is fitted, and effects are sought with it.
     TimingNoise,
     /// One sparse term that explains as much doubts the effects.
     CompetingTerm,
     /// One sparse term that explains more than all effects takes their place or joins them.
     TermInstead,
+    /// Autocorrelation: sparse terms that explain it are taken.
+    TermsExplainAutocorrelation,
+    /// Autocorrelation: a term with which odometry drifts more shows that another cause is present.
+    SpuriousTerm,
     /// Autocorrelation: measurements are thinned where it lasts.
     ThinIfAutocorrelated,
     /// Search: a second search at a higher level where residuals depend on something.

@@ -86,7 +86,7 @@ pub(crate) fn scatter(structure: &MeanStructure<'_>, recorded: &[Dataset], witho
     if findings.is_empty() {
         findings.extend(Rule::LargeErrors.finds(large_errors(structure, without_ids)));
     }
-    let may_be_rest = !structure.found.model.candidates.is_empty() || turns.is_some();
+    let may_be_rest = structure.spurious || !structure.found.model.candidates.is_empty() || turns.is_some();
     findings.extend(lasting.map(|lasting| lasting.finding(may_be_rest, without_ids)));
     findings.extend(turns);
     findings

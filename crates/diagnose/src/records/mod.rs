@@ -4,6 +4,7 @@ pub(crate) mod clock_drift;
 pub(crate) mod clock_offsets;
 pub(crate) mod clock_profile;
 pub(crate) mod large_log;
+pub(crate) mod log;
 pub(crate) mod log_rows;
 pub(crate) mod names;
 pub(crate) mod part_of_runs;

@@ -9,6 +9,7 @@ use crate::candidates::candidate::Candidate;
 use crate::records::clock_drift::{DriftFound, clock_drift};
 use crate::records::clock_offsets::{Clocks, clock_offsets};
 use crate::records::clock_profile::RunClock;
+use crate::records::log::Log;
 use crate::records::stamp_errors::{StampError, stamp_error_by_counts, uncertain_tick_s};
 use crate::records::unknown_motion::{Anomaly, UnknownMotions, unknown_motions};
 
@@ -25,8 +26,9 @@ pub(crate) struct Prepared<'d> {
 }
 
 impl<'d> Prepared<'d> {
-    /// Of records as they were read. An offset of all clocks is taken off from so many seconds on.
-    pub(crate) fn of(recorded: &'d [Dataset], every_term: &[Candidate], min_common_clock_s: f64) -> Self {
+    /// Of a log. An offset of all clocks is taken off from so many seconds on.
+    pub(crate) fn of(log: Log<'d>, every_term: &[Candidate], min_common_clock_s: f64) -> Self {
+        let recorded = log.datasets;
         // The sampling periods of all runs, on all cores: whoever asks for them later asks run by run.
         recorded.par_iter().flat_map(|dataset| &dataset.runs).for_each(|run| {
             let _ = run.odometry.t_s.sampling_period();
@@ -41,7 +43,7 @@ impl<'d> Prepared<'d> {
         };
         let clocks = clock_offsets(datasets, of_runs, min_common_clock_s);
         let datasets = clocks.records.as_deref().unwrap_or(datasets);
-        let odd = unknown_motions(datasets, clocks.remaining_s, uncertain_tick_s(recorded));
+        let odd = unknown_motions(datasets, clocks.remaining_s, uncertain_tick_s(recorded), log.cuts_events);
         Self { recorded, by_counts, drift, clocks, odd }
     }
 

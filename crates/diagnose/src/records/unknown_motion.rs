@@ -43,8 +43,14 @@ pub(crate) struct UnknownMotions {
 }
 
 /// Looks for them; `None` where there are none. The instrument is late by so much in all runs. In some run a
-/// row may be stamped a tick of so long off, seconds: what the robot moves meanwhile is no event.
-pub(crate) fn unknown_motions(datasets: &[Dataset], late_s: f64, tick_s: f64) -> Option<UnknownMotions> {
+/// row may be stamped a tick of so long off, seconds: what the robot moves meanwhile is no event. Runs alone
+/// are looked for without `with_events`.
+pub(crate) fn unknown_motions(
+    datasets: &[Dataset],
+    late_s: f64,
+    tick_s: f64,
+    with_events: bool,
+) -> Option<UnknownMotions> {
     let separation_m = datasets.first()?.robot.wheel_separation_m;
     let tracks = PoseTrack::of_all(datasets, late_s);
     let calibrated = CalibratedTracks::of(&tracks, separation_m)?;
@@ -66,7 +72,8 @@ pub(crate) fn unknown_motions(datasets: &[Dataset], late_s: f64, tick_s: f64) ->
     let pairs: usize = tracks.iter().map(|track| track.len() - 1).sum();
     let minutes: f64 = tracks.iter().map(|track| (track.t_s[track.len() - 1] - track.t_s[0]) / 60.0).sum();
     let spoiled: usize = events.iter().map(|(_, event)| event.poses.len() - 1).sum();
-    if spoiled as f64 > RECORDS.max_unknown_share * pairs as f64
+    if !with_events
+        || spoiled as f64 > RECORDS.max_unknown_share * pairs as f64
         || events.len() as f64 > RECORDS.max_unknown_events_per_run * minutes.max(tracks.len() as f64)
     {
         events.clear();
@@ -188,27 +195,37 @@ mod tests {
     }
 
     fn found(happens: Happens) -> UnknownMotions {
-        unknown_motions(&[driven(Some(happens))], 0.0, 0.0).expect("something happens")
+        unknown_motions(&[driven(Some(happens))], 0.0, 0.0, true).expect("something happens")
     }
 
     #[test]
     fn what_is_ordinary_and_what_is_undone_at_once_is_no_event() {
-        assert!(unknown_motions(&[driven(None)], 0.0, 0.0).is_none());
+        assert!(unknown_motions(&[driven(None)], 0.0, 0.0, true).is_none());
         for row in [0, 1, 100, 199, 200] {
             let outlier = Happens::Outlier(Pose::new(0.5, 0.3, 0.4), row);
-            assert!(unknown_motions(&[driven(Some(outlier))], 0.0, 0.0).is_none(), "row {row}");
+            assert!(unknown_motions(&[driven(Some(outlier))], 0.0, 0.0, true).is_none(), "row {row}");
         }
         // Counts fall behind over half a second, 0.1 m at the most, and catch up within a row.
         for rows in [2, 4, 5] {
-            assert!(unknown_motions(&[driven(Some(Happens::RowsWait(rows)))], 0.0, 0.0).is_none(), "{rows} rows");
+            assert!(unknown_motions(&[driven(Some(Happens::RowsWait(rows)))], 0.0, 0.0, true).is_none(), "{rows} rows");
         }
         // What the robot drives in a tick, 0.3 m/s, may be a stamp's, where stamps do not say of which tick a
         // row is.
         let step = driven(Some(Happens::Carried(Pose::new(0.05, 0.0, 0.0), 1)));
-        assert!(unknown_motions(std::slice::from_ref(&step), 0.0, 0.0).is_some());
-        assert!(unknown_motions(&[step], 0.0, 0.1).is_none());
+        assert!(unknown_motions(std::slice::from_ref(&step), 0.0, 0.0, true).is_some());
+        assert!(unknown_motions(&[step], 0.0, 0.1, true).is_none());
         // Below what wheels can miss.
-        assert!(unknown_motions(&[driven(Some(Happens::Carried(Pose::new(0.01, 0.0, 0.02), 1)))], 0.0, 0.0).is_none());
+        assert!(
+            unknown_motions(&[driven(Some(Happens::Carried(Pose::new(0.01, 0.0, 0.02), 1)))], 0.0, 0.0, true).is_none()
+        );
+    }
+
+    #[test]
+    fn runs_of_another_mounting_are_left_out_where_events_are_not_sought() {
+        let by = |happens| unknown_motions(&[driven(Some(happens))], 0.0, 0.0, false);
+        assert!(by(Happens::Carried(Pose::new(0.2, -0.1, 0.3), 5)).is_none());
+        let left = by(Happens::Elsewhere(Pose::new(0.05, 0.02, 0.2))).expect("a run");
+        assert_eq!((left.records[0].runs.len(), left.anomalies.len()), (7, 1));
     }
 
     #[test]
@@ -262,7 +279,7 @@ mod tests {
             ("turned elsewhere", Happens::Elsewhere(Pose::new(0.05, 0.02, 0.2))),
             ("both", Happens::Elsewhere(Pose::new(0.08, 0.02, 0.15))),
         ] {
-            let found = unknown_motions(&[driven(Some(happens))], 0.0, 0.0);
+            let found = unknown_motions(&[driven(Some(happens))], 0.0, 0.0, true);
             let spans = |of: &UnknownMotions| -> Vec<usize> {
                 of.records[0].runs.iter().map(|run| run.unknown_motion.len()).collect()
             };
@@ -299,7 +316,7 @@ mod tests {
             let by = Pose::new(0.2, -0.1, 0.3);
             let (mut all, carried) = (driven(None), driven(Some(Happens::Carried(by, rows))));
             all.runs[..runs].iter_mut().for_each(|run| run.truth.clone_from(&carried.runs[3].truth));
-            unknown_motions(&[all], 0.0, 0.0).map(|of| of.anomalies.len())
+            unknown_motions(&[all], 0.0, 0.0, true).map(|of| of.anomalies.len())
         };
         assert_eq!((with(2, 3), with(5, 3)), (Some(2), Some(5)));
         // 25 rows in each of seven runs are more than a tenth.

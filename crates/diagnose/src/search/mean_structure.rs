@@ -1,15 +1,15 @@
 //! The mean model: which effects and sparse terms a base fit needs.
 //!
-//! Stages, each a function of the results before it: search, comparison with one sparse term, thinning of
-//! autocorrelated measurements, search at a higher level, sparse terms with the effects. Once sparse terms
-//! are found, the stages after that leave the model as it is.
+//! Stages, each a function of the results before it: search, search without the outlier gate, comparison with
+//! one sparse term, sparse terms for autocorrelation or thinning, search at a higher level, sparse terms with
+//! the effects. Once sparse terms are found, the stages after that leave the model as it is.
 
 use dataset::Dataset;
 use estimation::{FitSettings, ModelFit};
 use rules::Rule;
 
 use crate::candidates::candidate::{Candidate, terms};
-use crate::checks::check::TestResult;
+use crate::checks::check::{Check, TestResult};
 use crate::checks::residual_tests::{Checked, check};
 use crate::findings::finding;
 use crate::fits::augmented_model::AugmentedModel;
@@ -17,7 +17,7 @@ use crate::fits::fit_cache::FitCache;
 use crate::fits::model_comparison::{log_bayes_factor, margin_over_units, odds_within};
 use crate::records::part_of_runs::part_of_runs;
 use crate::records::record_faults::sessions;
-use crate::search::selection::{SearchResult, search};
+use crate::search::selection::{SearchResult, search, search_ungated};
 use crate::search::sparse_terms::{SparseSearch, UncataloguedTerms, sparse};
 use crate::settings::{LEVELS, SEARCH};
 
@@ -38,6 +38,9 @@ pub(crate) struct MeanStructure<'a> {
     pub(crate) unlisted: Option<UncataloguedTerms<'a>>,
     /// Correlation of successive measurements, where they were thinned: coefficient, and standard errors.
     pub(crate) correlated: Option<(f64, f64)>,
+    /// A sparse term made measurements certainly likelier though odometry drifts more with it: another
+    /// cause is present.
+    pub(crate) spurious: bool,
     /// Posterior odds of one uncatalogued term against all named effects; `None` if none is named or it
     /// replaced them.
     pub(crate) competing: Option<f64>,
@@ -68,6 +71,17 @@ impl<'a> MeanModel<'a> {
         Self { checked: check(&unlisted.model), unlisted: Some(unlisted), ..self }
     }
 
+    /// Takes sparse terms in.
+    fn take_terms(&mut self, unlisted: UncataloguedTerms<'a>) {
+        self.checked = check(&unlisted.model);
+        self.unlisted = Some(unlisted);
+    }
+
+    /// Whether more measurements are outliers than the noise model predicts.
+    fn has_outliers(&self) -> bool {
+        self.checked.checks.iter().any(|test| test.check == Check::Outliers && !test.passes)
+    }
+
     /// Whether residuals depend on a recorded quantity.
     fn shows_dependence(&self) -> bool {
         self.checked.checks.iter().any(TestResult::shows_dependence)
@@ -80,27 +94,43 @@ pub(crate) fn mean_structure<'a>(
     base: ModelFit<'a>,
     catalogue: &[Candidate],
 ) -> MeanStructure<'a> {
-    let (mut searched, mut correlated) = match correlation_by_part(datasets, &base, catalogue) {
-        Some(correlation) => {
+    let (mut searched, by_part) = match correlation_by_part(datasets, &base, catalogue) {
+        Some(by_part) => {
             let whole = base.clone().without_innovations(); // most of its memory
             match thinned(datasets, base) {
-                Some(thinned) => (search_among_all(thinned, catalogue), Some(correlation)),
+                Some(thinned) => (search_among_all(thinned, catalogue), Some(by_part)),
                 None => (search_among_all(whole.with_innovations(&mut []).into_owned(), catalogue), None),
             }
         }
         None => (search_among_all(base, catalogue), None),
     };
-    if correlated.is_none()
-        && let Some((thinned, correlation)) = searched.thinned_if_correlated(datasets)
+    let autocorrelation = by_part.or_else(|| searched.explain_autocorrelation());
+    let mut correlated = by_part.map(|by_part| by_part.correlation);
+    if by_part.is_none()
+        && let Some(Autocorrelation { correlation, lasts, .. }) = autocorrelation
+        && Rule::ThinIfAutocorrelated.applies(lasts)
+        && let Some(thinned) = thinned_beside(datasets, &searched.base, &searched.model.found.model)
     {
         drop(searched); // its fits are large
         searched = search_among_all(thinned, catalogue);
         correlated = Some(correlation);
     }
+    let spurious = autocorrelation.is_some_and(|of| of.spurious);
     let Searched { base, model } = searched;
     let model = terms_if_dependent(&base, search_if_dependent(model, catalogue));
     let MeanModel { found, unlisted, checked, competing } = model;
-    MeanStructure { base, found, checked, unlisted, correlated, competing }
+    MeanStructure { base, found, checked, unlisted, correlated, spurious, competing }
+}
+
+/// Residuals that are autocorrelated with the effects found among all measurements.
+#[derive(Clone, Copy)]
+struct Autocorrelation {
+    /// Coefficient, and standard errors.
+    correlation: (f64, f64),
+    /// As in [`MeanStructure`].
+    spurious: bool,
+    /// No sparse terms explain it.
+    lasts: bool,
 }
 
 /// A base fit, and the model that was found with it.
@@ -109,18 +139,26 @@ struct Searched<'a> {
     model: MeanModel<'a>,
 }
 
-impl<'a> Searched<'a> {
-    /// The autocorrelation that is left with what was found: coefficient, and standard errors.
-    /// Autocorrelated measurements taken as independent make any effect too significant.
-    fn lasting_correlation(&self) -> Option<(f64, f64)> {
-        let lasts = self.model.unlisted.is_none() && !is_white(&self.model.checked);
-        lasts.then_some(self.model.checked.correlation)
-    }
-
-    /// The base fit to thinned measurements, where all are autocorrelated, and by how much they are.
-    fn thinned_if_correlated(&self, datasets: &'a [Dataset]) -> Option<(ModelFit<'a>, (f64, f64))> {
-        let correlation = self.lasting_correlation().filter(|_| Rule::ThinIfAutocorrelated.applies(true))?;
-        Some((thinned_beside(datasets, &self.base, &self.model.found.model)?, correlation))
+impl Searched<'_> {
+    /// Where residuals are autocorrelated: sparse terms if they explain that. Autocorrelated measurements taken
+    /// as independent make any effect too significant.
+    fn explain_autocorrelation(&mut self) -> Option<Autocorrelation> {
+        let Self { base, model } = self;
+        if model.unlisted.is_some() || is_white(&model.checked) {
+            return None;
+        }
+        let correlation = model.checked.correlation;
+        let best = SparseSearch::beside(LEVELS.sparse_term_level, base, &model.found.model)
+            .and_then(|search| search.best_prediction(LEVELS.sparse_term_level));
+        let tried = best.map(|sparse| (check(&sparse.model), sparse));
+        let spurious = tried.as_ref().is_some_and(|(_, sparse)| sparse.certain && sparse.drifts_more);
+        let explains = tried.filter(|(checked, sparse)| !sparse.drifts_more && (is_white(checked) || sparse.certain));
+        let explains = Rule::TermsExplainAutocorrelation.finds(explains);
+        let lasts = explains.is_none();
+        if let Some((_, sparse)) = explains {
+            model.take_terms(UncataloguedTerms::from(base, sparse));
+        }
+        Some(Autocorrelation { correlation, spurious: Rule::SpuriousTerm.applies(spurious), lasts })
     }
 }
 
@@ -137,7 +175,16 @@ fn search_among_all<'a>(base: ModelFit<'a>, catalogue: &[Candidate]) -> Searched
             (noisy, found)
         }
     };
-    let model = compare_with_sparse(&base, MeanModel::of_effects(found));
+    let mut model = MeanModel::of_effects(found);
+    // A large effect in few measurements looks like outliers: where there are more of them than noise makes,
+    // or than with the effects that were found.
+    let outliers = |fit: &ModelFit<'_>| fit.solution.pass.outliers.len();
+    if (model.has_outliers() || outliers(&base) > outliers(&model.found.model.fit))
+        && let Some(ungated) = Rule::UngatedSearch.finds(search_ungated(&model.found, catalogue))
+    {
+        model = MeanModel::of_effects(ungated);
+    }
+    let model = compare_with_sparse(&base, model);
     Searched { base, model }
 }
 
@@ -166,14 +213,14 @@ fn thinned_beside<'a>(
 /// What lasts of the measurements' autocorrelation, as far as a part of the runs tells: it says which effects
 /// stand beside an autocorrelation, and all measurements how large that is with these effects. `None` where
 /// the part does not say so, or all do not agree: what is sought among all is needed then.
-fn correlation_by_part(datasets: &[Dataset], base: &ModelFit<'_>, catalogue: &[Candidate]) -> Option<(f64, f64)> {
+fn correlation_by_part(datasets: &[Dataset], base: &ModelFit<'_>, catalogue: &[Candidate]) -> Option<Autocorrelation> {
     let part = Rule::AutocorrelationByPart.finds(part_of_runs(datasets, base))?;
     let beside_none = check(&AugmentedModel::base(base));
     if is_white(&beside_none) {
         return None;
     }
-    let part = search_among_all(FitSettings::GEOMETRY_ONLY.fit(&part).ok()?, catalogue);
-    part.lasting_correlation()?;
+    let mut part = search_among_all(FitSettings::GEOMETRY_ONLY.fit(&part).ok()?, catalogue);
+    let of_part = part.explain_autocorrelation().filter(|of| of.lasts)?;
     let AugmentedModel { fit, candidates } = part.model.found.model;
     let checked = if candidates.is_empty() {
         beside_none
@@ -181,7 +228,7 @@ fn correlation_by_part(datasets: &[Dataset], base: &ModelFit<'_>, catalogue: &[C
         let fit = base.extended_from(fit.solution.model.term_values, &mut terms(&candidates)).ok()?;
         check(&AugmentedModel { fit, candidates })
     };
-    (!is_white(&checked)).then_some(checked.correlation)
+    (!is_white(&checked)).then_some(Autocorrelation { correlation: checked.correlation, ..of_part })
 }
 
 /// The base fit with the noise of instants that is left beside a model's effects; `None` where none is.

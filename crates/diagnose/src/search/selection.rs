@@ -2,7 +2,7 @@
 
 use rules::Rule;
 
-use crate::candidates::candidate::Candidate;
+use crate::candidates::candidate::{Candidate, terms};
 use crate::checks::run_to_run::differs_from_run_to_run;
 use crate::fits::augmented_model::AugmentedModel;
 use crate::fits::cancellation::effects_cancel;
@@ -28,6 +28,9 @@ pub(crate) struct SearchResult<'a> {
     pub(crate) names: Vec<Vec<Name>>,
     /// For each candidate, its test at the end, in the presence of the others.
     pub(crate) tests: Vec<Test>,
+    /// For each candidate, the standard deviation that uncertain variants and causes add to each of its
+    /// sizes.
+    extra_sigma: Vec<Vec<f64>>,
     /// The first scan, effect by effect.
     pub(crate) first_scan: Vec<Entry>,
     /// Why significant candidates are not in the model.
@@ -311,7 +314,38 @@ pub(crate) fn search<'a>(mut known: FitCache<'a>, catalogue: &[Candidate], level
             extra_sigma.remove(index);
         }
     }
-    SearchResult { tests: tests_of(&model, &extra_sigma), model, names, first_scan, refusals, known }
+    SearchResult { tests: tests_of(&model, &extra_sigma), model, names, extra_sigma, first_scan, refusals, known }
+}
+
+/// What a search without the outlier gate finds. A large effect that shows in few measurements makes them
+/// outliers, and among the others it is not detected. It holds if with the gate on it rejects fewer
+/// measurements than what was found, and is likelier by the margin.
+pub(crate) fn search_ungated<'a>(found: &SearchResult<'a>, catalogue: &[Candidate]) -> Option<SearchResult<'a>> {
+    let base = found.known.base();
+    let bold = search(FitCache::of(&base.refit_ungated().ok()?), catalogue, LEVELS.scan_level);
+    if bold.model.candidates.is_empty() {
+        return None;
+    }
+    let candidates = bold.model.candidates;
+    let model = AugmentedModel { fit: bold.model.fit.refit_gated(&mut terms(&candidates)).ok()?, candidates };
+    let outliers = |model: &AugmentedModel<'_>| model.fit.solution.pass.outliers.len();
+    let (before, after) = (log_bayes_factor(base, &found.model), log_bayes_factor(base, &model));
+    let tests = tests_of(&model, &bold.extra_sigma);
+    let trials = tests_in(&bold.first_scan);
+    let holds = outliers(&model) < outliers(&found.model)
+        && after > before + log_odds_margin(before)
+        && tests.iter().all(|test| test.p_value * trials <= LEVELS.scan_level)
+        && gain(&AugmentedModel::base(base), &model)
+            .map_or(true, |gain| !gain.predicts_worse() && !gain.drifts_more_by(SEARCH.max_drift_increase_intervals));
+    holds.then(|| SearchResult {
+        model,
+        tests,
+        names: bold.names,
+        extra_sigma: bold.extra_sigma,
+        first_scan: found.first_scan.clone(),
+        refusals: bold.refusals,
+        known: found.known.clone(),
+    })
 }
 
 #[cfg(test)]

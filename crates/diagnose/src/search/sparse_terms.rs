@@ -25,6 +25,11 @@ pub(crate) struct FoundTerm<'a> {
     pub(crate) p_value: f64,
     /// How many products were tried.
     pub(crate) trials: usize,
+    /// Its gain on held-out runs is more than two half-widths of the 95 % interval above zero;
+    /// autocorrelated measurements, which differ from run to run, do not reach that.
+    pub(crate) certain: bool,
+    /// Measurements are likelier with it, but odometry drifts more: it stands for something else.
+    pub(crate) drifts_more: bool,
 }
 
 /// Log of the trials of a sparse term.
@@ -196,22 +201,33 @@ impl<'m, 'a> SparseSearch<'m, 'a> {
     /// The best of them that predicts held-out runs better, if the best is significant by its score, and
     /// unless odometry drifts more with it.
     pub(crate) fn finding(&self, level: f64) -> Option<FoundTerm<'a>> {
+        self.best_prediction(level).filter(|term| !term.drifts_more)
+    }
+
+    /// The same, whether odometry drifts more with it or not.
+    pub(crate) fn best_prediction(&self, level: f64) -> Option<FoundTerm<'a>> {
         if self.p_value > level {
             return None;
         }
         let predicting = self.refitted.iter().filter_map(|extended| {
             let earned = gain(self.model, extended).ok()?;
             let score = earned.log_score_per_observation;
-            (score.low > 0.0).then_some((score.extended, extended, earned.drifts_more()))
+            let certain = score.low + score.high > 2.0 * (score.high - score.low);
+            (score.low > 0.0).then_some((score.extended, extended, certain, earned.drifts_more()))
         });
-        let best = predicting.max_by(|a, b| a.0.total_cmp(&b.0));
-        let (_, extended, _) = best.filter(|(.., drifts_more)| !drifts_more)?;
-        // What is no more than the error of a larger effect's form is none.
+        let (_, extended, certain, drifts_more) = predicting.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        // What is no more than the error of a larger effect's form is none beside it.
         let (test, _) = wald_test(extended, self.model.candidates.len())?;
         // As many parameters as observations leave no scatter, and a size without one is not determined.
         let is_determined = test.estimates.iter().all(|(_, sigma)| sigma.is_finite());
         let is_found = is_determined && test.statistic >= form_error_statistic(self.model);
-        is_found.then(|| FoundTerm { model: extended.clone(), p_value: self.p_value, trials: self.trials })
+        is_found.then(|| FoundTerm {
+            model: extended.clone(),
+            p_value: self.p_value,
+            trials: self.trials,
+            certain,
+            drifts_more,
+        })
     }
 
     /// The likeliest of them.

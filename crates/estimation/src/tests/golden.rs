@@ -145,6 +145,7 @@ fn write_fit(text: &mut String, name: &str, dataset: &Dataset) -> std::fmt::Resu
     let fit = FitSettings::GEOMETRY_ONLY.fit(&[dataset.session()]).expect("a fit");
     let mut term: Vec<Box<dyn ModelTerm>> = vec![Box::new(TravelTerm)];
     write_solution(text, name, &fit.extended(&mut term).expect("a fit"), &mut term)?;
+    write_solution(text, name, &fit.refit_ungated().expect("a fit"), &mut [])?;
     write_solution(text, name, &fit.without_noise(NoiseComponent::Turn, &mut []).expect("a fit"), &mut [])
 }
 

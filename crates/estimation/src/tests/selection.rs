@@ -177,6 +177,7 @@ fn a_fit_of_every_measurement_is_thinned_to_the_bits_of_one_that_thins_from_the_
     assert_eq!(further.solution.pass.runs, whole.solution.pass.runs);
     // Fits that have gone on are no first step.
     assert!(further.clone().thinned_further().is_none());
+    assert!(every.refit_ungated().expect("a fit").thinned_further().is_none());
     assert!(every.extended(&mut [Box::new(TravelTerm)]).expect("a fit").thinned_further().is_none());
 }
 

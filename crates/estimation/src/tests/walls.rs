@@ -115,6 +115,8 @@ fn a_reading_ten_standard_deviations_off_is_rejected_and_moves_nothing() {
         let moved = errors(&fit).iter().zip(sound_errors).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         // The noise of the fits differs by what their last steps leave.
         assert!(moved < NOISELESS, "{moved}");
+        let ungated = fit.refit_ungated().expect("a fit");
+        assert_eq!(ungated.partial_outliers(), []);
     }
 }
 

@@ -27,7 +27,7 @@ fn structure<'a>(datasets: &'a [Dataset], checks: &[(Check, f64, bool)]) -> Mean
     let checks = checks.iter().map(of).collect();
     let outliers = Outliers { p_value: 1.0, ..Outliers::default() };
     let checked = Checked { autocorrelated: false, checks, correlation: (0.0, 0.0), outliers };
-    MeanStructure { base, found, checked, unlisted: None, correlated: None, competing: None }
+    MeanStructure { base, found, checked, unlisted: None, correlated: None, spurious: false, competing: None }
 }
 
 fn results<'e, 'a>(datasets: &'e [Dataset], structure: &'e MeanStructure<'a>) -> StageResults<'e, 'a> {
