@@ -10,6 +10,7 @@ use scenario::Scenario;
 
 use crate::alternatives::{Alternative, alternatives};
 use crate::augmented_model::{AugmentedModel, refit};
+use crate::beam::{ComparedModel, beam};
 use crate::candidate::{Candidate, mean_terms};
 use crate::carry_over::{CarryOver, carry_over};
 use crate::check::TestResult;
@@ -45,13 +46,15 @@ pub struct Options {
     pub without: Vec<String>,
     /// Floor, time and speed within which the next experiment is sought; `None`: none is sought.
     pub limits: Option<Limits>,
+    /// Whether models of an experiment are fitted too ([`Diagnosis::beam`]).
+    pub beam: bool,
     /// What is told when a stage begins: a large log takes minutes.
     pub on_stage: OnStage,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { without: Vec::new(), limits: Some(Limits::default()), on_stage: OnStage::default() }
+        Self { without: Vec::new(), limits: Some(Limits::default()), beam: false, on_stage: OnStage::default() }
     }
 }
 
@@ -117,6 +120,8 @@ pub struct Diagnosis {
     /// The geometry that suits these data best where none of the robot's own effects can be expressed: fitted
     /// beside what was found of the instrument alone. `None` where faults of the records were undone first.
     pub geometry_alone: Option<CalibrationReport>,
+    /// Models for experiments on their comparison, where they are asked for.
+    pub beam: Vec<ComparedModel>,
 }
 
 /// A model with its terms, to be compared with other records.
@@ -364,6 +369,7 @@ fn stages(
             next_experiment(records, (&structure.base, &structure.found), (model, &catalogue, &blind_to), limits)
         }
     };
+    let beam = if options.beam { beam(&structure, &catalogue) } else { Vec::new() };
     let extended = crate::extended_scenario::scenario_of(records, &datasets[0].robot, &faults, stamps, &carried);
     begins(Step::Residuals);
     let residuals = residuals(&structure.base, model);
@@ -412,6 +418,7 @@ fn stages(
             found,
             carried,
             geometry_alone,
+            beam,
         },
     })
 }

@@ -45,6 +45,11 @@ impl<'a> FitCache<'a> {
         self.fits.iter().map(Arc::as_ref).find(|model| model.candidates == candidates)
     }
 
+    /// All fits that were made.
+    pub(crate) fn fits(&self) -> impl Iterator<Item = &AugmentedModel<'a>> {
+        self.fits.iter().map(Arc::as_ref)
+    }
+
     /// A model without one of its candidates; the base where it has no other.
     pub(crate) fn without(
         &mut self,

@@ -10,6 +10,7 @@
 mod alternatives;
 mod anomaly_findings;
 mod augmented_model;
+mod beam;
 mod cancellation;
 mod candidate;
 mod carry_over;
@@ -81,6 +82,7 @@ mod small_robot;
 mod tests;
 
 pub use alternatives::{Alternative, Status};
+pub use beam::ComparedModel;
 pub use diagnosis::{DiagnoseError, Diagnosis, FittedModel, Options, diagnose, diagnose_large};
 pub use document::{
     Blind, CandidateCause, Check, Compared, Differences, Document, Drift, Finding, Gain, GainLevel, HeldOutDrift,

@@ -4,6 +4,7 @@
 //! *Budgeted* of an error budget, *Tuned* on something, or a *Convention*. docs/settings.md is made of
 //! these files.
 
+pub(crate) mod beam;
 pub(crate) mod carry_over;
 pub(crate) mod findings;
 pub(crate) mod large_log;
