@@ -40,6 +40,9 @@ pub(crate) struct Arguments {
     /// Write into a folder that is not empty.
     #[arg(long)]
     force: bool,
+    /// File for models of an experiment, a line of JSON each (docs/one-model.md).
+    #[arg(long, value_name = "FILE", hide = true)]
+    beam: Option<PathBuf>,
 }
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode, Failure> {
@@ -49,10 +52,16 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
     let log = Log::read(&arguments.datasets, terminal)?;
     check::before(log.datasets(), terminal);
     let bar = terminal.stages("diagnose");
-    let options = Options { without: arguments.without.clone(), on_stage: shown_on(bar.clone()), ..Options::default() };
+    let (without, on_stage) = (arguments.without.clone(), shown_on(bar.clone()));
+    let mut options = Options { without, on_stage, beam: arguments.beam.is_some(), ..Options::default() };
+    options.limits = options.limits.filter(|_| !options.beam);
     let diagnosis = ::diagnose::diagnose(&log, &options);
     bar.finish_and_clear();
     let mut diagnosis = diagnosis?;
+    if let Some(file) = &arguments.beam {
+        let lines: Result<Vec<String>, _> = diagnosis.beam.iter().map(serde_json::to_string).collect();
+        write_whole(file, lines?.join("\n").as_bytes())?;
+    }
     if arguments.nested {
         let options = Options { without: arguments.without.clone(), ..Options::default() };
         diagnosis.document.nested = nested_gains(log.datasets(), &options)?;

@@ -123,8 +123,12 @@ fn of_data(
 ) -> Result<ExitCode, Failure> {
     let log = Log::read(sources, terminal)?;
     let bar = terminal.stages("plan");
-    let options =
-        Options { without: arguments.without.clone(), limits: Some(*limits), on_stage: shown_on(bar.clone()) };
+    let options = Options {
+        without: arguments.without.clone(),
+        limits: Some(*limits),
+        on_stage: shown_on(bar.clone()),
+        ..Options::default()
+    };
     let diagnosis = ::diagnose::diagnose(&log, &options);
     bar.finish_and_clear();
     let Diagnosis { document, extended, .. } = diagnosis?;

@@ -300,8 +300,7 @@ fn a_setting_without_a_source_is_refused() {
         source: "Tuned: by hand; no record of what on.".to_owned(),
     };
     assert_eq!(settings("settings.rs", sound), Ok(vec![row("T_S", "[1.0, 2.0]")]));
-    let field =
-        "rules::settings! {\n    Times\n    /// Seconds. A time.\n    /// Tuned: by hand.\n    t_s: f64 = 1e-3,\n}\n";
+    let field = "rules::settings! {\n    Times\n    /// Seconds. A time.\n    /// Tuned: by hand; no record\n    /// of what on.\n    t_s: f64 = 1e-3,\n}\n";
     assert_eq!(settings("settings.rs", field), Ok(vec![row("t_s", "1e-3")]));
     assert!(settings("settings.rs", &field.replace("Tuned", "Chosen")).is_err());
     assert!(settings("settings.rs", "/// Seconds. A time.\npub const T_S: f64 = 1.0;\n").is_err());

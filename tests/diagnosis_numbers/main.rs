@@ -110,7 +110,7 @@ fn regress_no_number_moves_where_something_is_not_to_be_named_and_floor_and_time
     let stages = Arc::new(Mutex::new(String::new()));
     let reported = Arc::clone(&stages);
     let on_stage = OnStage::call(move |stage| reported.lock().expect("one thread").push_str(&format!("{stage:?}\n")));
-    let options = Options { without, limits: Some(limits), on_stage };
+    let options = Options { without, limits: Some(limits), on_stage, ..Options::default() };
     let mut text = String::new();
     for (name, dataset) in other_logs().into_iter().filter(|(name, _)| ["swapped", "moved run"].contains(name)) {
         text += &written(name, &[dataset], &options);

@@ -141,7 +141,7 @@ fn has_most_rejected(fit: &ModelFit<'_>) -> bool {
     rejected_share(fit) > RECORDS.max_rejected_fraction
 }
 
-/// Whether the odometry is uncorrelated with what the instrument measured; an error where nothing can be said.
+/// Whether the odometry is uncorrelated with what was measured; an error where nothing can be said.
 fn is_uncorrelated(structure: &MeanStructure<'_>, has_no_fault: bool) -> Result<bool, DiagnoseError> {
     let found = &structure.found.model;
     // A large effect makes outliers of what the calibrated model alone cannot follow.

@@ -44,6 +44,7 @@ pub use plan::{HANDLING_S, Limits, MINUTES, PlanError, ScenarioPlan, moved_over_
 pub use records::large_log::LargeLog;
 pub use records::log::Log;
 pub use report::{Diagnosis, FittedModel};
+pub use search::beam::ComparedModel;
 pub use search::rivals::Refusal;
 pub use settings::levels::CHECKS_LEVEL;
 pub use stage::{OnStage, Stage};

@@ -12,10 +12,12 @@ pub struct Options {
     pub limits: Option<Limits>,
     /// What is told when a stage begins: a large log takes minutes.
     pub on_stage: OnStage,
+    /// Whether models for experiments on their comparison are made.
+    pub beam: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { without: Vec::new(), limits: Some(Limits::default()), on_stage: OnStage::default() }
+        Self { without: Vec::new(), limits: Some(Limits::default()), on_stage: OnStage::default(), beam: false }
     }
 }

@@ -27,6 +27,7 @@ use crate::records::names::session_names;
 use crate::records::prepared::Prepared;
 use crate::records::record_faults::{Fault, rejected_share, sessions};
 use crate::records::stamp_errors::StampError;
+use crate::search::beam::{ComparedModel, beam};
 use crate::search::mean_structure::{MeanStructure, THINNED};
 use crate::stage::Step;
 use crate::text;
@@ -55,6 +56,8 @@ pub struct Diagnosis {
     /// The geometry that suits these data best where none of the robot's own effects can be expressed: fitted
     /// beside what was found of the instrument alone. `None` where faults of the records were undone first.
     pub geometry_alone: Option<CalibrationReport>,
+    /// Models for experiments on their comparison, where they are asked for.
+    pub beam: Vec<ComparedModel>,
     /// Share of the measurements that are outliers with all that was found.
     pub(crate) outlier_share: f64,
 }
@@ -220,6 +223,7 @@ impl<'a> Explained<'_, 'a> {
             calibrated: FittedModel::of(&calibrated),
             found: FittedModel::of(model),
             carried: FittedModel::of(&carried),
+            beam: if options.beam { beam(structure, catalogue) } else { Vec::new() },
             outlier_share: rejected_share(&model.fit),
             geometry_alone: self.faults.is_empty().then(|| report_of(&of_instrument)),
         }

@@ -61,6 +61,11 @@ impl<'a> FitCache<'a> {
         self.fits.iter().map(Arc::as_ref).find(|model| model.candidates == candidates)
     }
 
+    /// All fits that were made.
+    pub(crate) fn fits(&self) -> impl Iterator<Item = &AugmentedModel<'a>> {
+        self.fits.iter().map(Arc::as_ref)
+    }
+
     /// A model without one of its candidates; the base where it has no other.
     pub(crate) fn without(&mut self, model: &AugmentedModel<'a>, index: usize) -> Option<AugmentedModel<'a>> {
         let fewer = self.fit(&others(model, index)).cloned().or_else(|| without(&self.base, model, index))?;

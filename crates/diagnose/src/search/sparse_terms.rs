@@ -230,6 +230,11 @@ impl<'m, 'a> SparseSearch<'m, 'a> {
         })
     }
 
+    /// All that were refitted, and of how many they are the best by their scores.
+    pub(crate) fn refitted(&self) -> (&[AugmentedModel<'a>], usize) {
+        (&self.refitted, self.trials)
+    }
+
     /// The likeliest of them.
     pub(crate) fn likeliest(&self) -> Option<&AugmentedModel<'a>> {
         self.refitted.iter().max_by(|a, b| self.log_bayes_factor_of(a).total_cmp(&self.log_bayes_factor_of(b)))

@@ -4,6 +4,7 @@
 //! *Budgeted* of an error budget, *Tuned* on something, or a *Convention*. docs/settings.md is made of
 //! these files.
 
+pub mod beam;
 pub mod carry_over;
 pub mod findings;
 pub mod large_log;
@@ -14,6 +15,7 @@ pub mod residuals;
 pub mod search;
 
 rules::rooms! {
+    beam: beam::Beam as BEAM,
     carry_over: carry_over::CarryOver as CARRY_OVER,
     findings: findings::Findings as FINDINGS,
     large_log: large_log::LargeLog as LARGE_LOG,

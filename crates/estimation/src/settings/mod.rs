@@ -377,6 +377,6 @@ rules::rooms! {
     poses_between_rows: poses_between_rows::PosesBetweenRows as POSES_BETWEEN_ROWS,
     recorded_rates: recorded_rates::RecordedRates as RECORDED_RATES,
     start_headings: start_headings::StartHeadings as START_HEADINGS,
-    thinning: thinning::Thinning as THINNING,
+    thinning: thinning::Spacing as THINNING,
     wheel_rates: wheel_rates::WheelRates as WHEEL_RATES,
 }

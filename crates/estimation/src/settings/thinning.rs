@@ -1,7 +1,7 @@
 //! Numbers of thinning: at which spacing measurements are taken whose errors are autocorrelated.
 
 rules::settings! {
-    Thinning
+    Spacing
     /// Phases in which thinned measurements are taken.
     /// Tuned: by hand; no record of what on.
     thinning_phases: usize = 4,
