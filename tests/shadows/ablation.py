@@ -1,6 +1,6 @@
 """What each rule is worth: how often it decides, and what the same logs come to without it (docs/ablation.md).
 
-    python ablation.py --logs DIR... --yair PATH --replay PATH [--rules RULE...] [--most N] [--work DIR]
+    python ablation.py --logs DIR... --yair PATH --replay PATH [--rules RULE...] [--most N] [--every N] [--work DIR]
 
 DIR holds logs with an answer.json each, as `replay` draws them. One run of every log counts the decisions of each rule. Then
 each rule is switched off by itself on at most N of the logs in which it decided, and `replay` compares the two builds there.
@@ -10,8 +10,10 @@ A rule that never decided is not run. Results are kept in the working folder by 
 import argparse
 import hashlib
 import json
+import math
 import os
 import random
+import re
 import subprocess
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -61,6 +63,38 @@ def without_rule(arguments, rule, logs, work):
     return json.loads(kept.read_text())
 
 
+def purposes():
+    """What each rule is for, by its name, from the sources."""
+    found, said = {}, []
+    for line in (Path(__file__).parents[2] / "crates/rules/src/lib.rs").read_text().splitlines():
+        line = line.strip()
+        if line.startswith("/// "):
+            said.append(line.removeprefix("/// "))
+        elif re.fullmatch(r"[A-Z]\w+,", line):
+            found[re.sub(r"(?<!^)(?=[A-Z])", "_", line.rstrip(",")).lower()] = " ".join(said)
+            said = []
+        else:
+            said = []
+    return found
+
+
+def moved(table):
+    """The measures that differ without a rule: with and without it, logs better and worse with it, p."""
+    said = []
+    for row in table["all"]:
+        if row["measure"] == "seconds":
+            low, high = row["difference"]
+            if low > 0 or high < 0:
+                said.append(f"time × {math.exp(low):.2f} to {math.exp(high):.2f}")
+        elif sum(row["discordant"]) > 0 and row["measure"] not in ("rms_z", "gain", "drift"):
+            before, after = (f"{100 * value:.0f}" for value in row["pooled"])
+            counts = " : ".join(str(count) for count in row["discordant"])
+            said.append(f"{row['measure']} {before} → {after} % of {row['logs']} ({counts}, p {row['p_value']:.2f})")
+        elif row["p_value"] < 0.05 and row["measure"] != "gain":
+            said.append(f"{row['measure']} {row['pooled'][0]:.2f} → {row['pooled'][1]:.2f} (p {row['p_value']:.3f})")
+    return "; ".join(said) or "nothing"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--logs", type=Path, nargs="+", required=True)
@@ -85,6 +119,7 @@ def main():
         for rule in of_rules:
             deciding.setdefault(rule, []).append(log)
     print(f"{len(logs)} logs")
+    tables = {}
     for rule, its_logs in sorted(deciding.items(), key=lambda item: len(item[1])):
         print(f"{rule}: decides in {len(its_logs)} ({100 * len(its_logs) / len(logs):.1f} %)", flush=True)
     for rule in sorted(deciding, key=lambda rule: len(deciding[rule])) if arguments.rules is None else arguments.rules:
@@ -97,8 +132,14 @@ def main():
         if table is None:
             print("    replay failed")
             continue
-        for row in table["all"]:
-            print("   ", json.dumps(row), flush=True)
+        print("    ", moved(table), flush=True)
+        tables[rule] = (min(arguments.most, len(its_logs)), moved(table))
+    print("| rule | what it is for | decides in, % | switched off in | moves |")
+    print("| --- | --- | ---: | ---: | --- |")
+    for rule, what in purposes().items():
+        share = 100 * len(deciding.get(rule, [])) / len(logs)
+        asked, moves = tables.get(rule, ("–", "–"))
+        print(f"| `{rule}` | {what} | {share:.1f} | {asked} | {moves} |")
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ use crate::options::Options;
 use crate::records::log::Log;
 use crate::records::prepared::Prepared;
 use crate::records::record_faults::{determines_wheels, faults, is_correlated, rejected_share, sessions};
-use crate::records::stamp_errors::{StampError, stamp_error, whole_stamp_error, with_rows_of};
+use crate::records::stamp_errors::{StampError, stamp_error, with_rows_of};
 use crate::records::unknown_motion::AnomalyKind;
 use crate::report::{AsStamped, Diagnosis, EVERY_MEASUREMENT, Explained};
 use crate::search::mean_structure::{MeanStructure, THINNED, mean_structure};
@@ -90,10 +90,9 @@ pub fn diagnose<'l>(log: impl Into<Log<'l>>, options: &Options) -> Result<Diagno
     begins(Step::MeanStructure);
     let base = correlated_base(records, base);
     // Stamps that are wrong: everything that comes from them is sought in records that are restamped.
-    let error = match prepared.by_counts {
-        Some(_) => None,
-        None => stamp_error_by_residuals(records, &base, &every_term),
-    };
+    let sought = prepared.by_counts.is_none() && is_correlated(&base, &[]);
+    let error = sought.then(|| stamp_error(records, &base, &every_term)).flatten();
+    let error = Rule::StampsByResiduals.finds(error);
     let restamped = error.as_ref().and_then(|error| Some((error, fit_restamped(error)?)));
     let stamped = (prepared.by_counts.is_some() && faults.is_empty()).then(|| with_rows_of(records, log.datasets));
     let (stamps, as_stamped, records, base) = match restamped {
@@ -158,13 +157,6 @@ fn is_uncorrelated(structure: &MeanStructure<'_>, has_no_fault: bool) -> Result<
         return Err(DiagnoseError::TooFewMeasurements);
     }
     Ok(is_uncorrelated)
-}
-
-/// An error of the stamps that the residuals of a base fit show.
-fn stamp_error_by_residuals(records: &[Dataset], base: &ModelFit<'_>, every_term: &[Candidate]) -> Option<StampError> {
-    let sought = is_correlated(base, &[]);
-    let error = Rule::StampsByResiduals.finds(sought.then(|| stamp_error(records, base, every_term)).flatten());
-    error.or_else(|| Rule::WholeStamps.finds(whole_stamp_error(records, base, every_term)))
 }
 
 /// The base fit to restamped records, if it explains as much as the error of the stamps does.

@@ -45,14 +45,10 @@ rules! {
     RecordFault,
     /// Records: a second fault is sought after the first.
     SecondRecordFault,
-    /// Records: of a log with few measurements and many outliers, only a fault that the log shows is undone.
-    VisibleFaultsOnly,
     /// Base fit: measurements are thinned where odometry seems uncorrelated with all of them.
     ThinnedIfUncorrelated,
     /// Records: stamps that the residuals show to be wrong are restored.
     StampsByResiduals,
-    /// Records: stamps of rows whose tick is uncertain are restored as a whole.
-    WholeStamps,
     /// Records: restored stamps are kept only if the log then explains as much.
     StampsUndone,
     /// Extrinsics found before the search take the place of the candidate that resembles them.
@@ -135,8 +131,6 @@ rules! {
     FaultyRecordsDoubt,
     /// Findings: failed checks that nothing explains.
     FailedChecks,
-    /// Findings: failed checks and noise effects that are no more than an error of form are left out.
-    WithoutErrorsOfForm,
     /// Findings: an effect may be part of a stronger unlisted or noise finding.
     PartOfStronger,
     /// Findings: an effect whose data have another form is doubted.

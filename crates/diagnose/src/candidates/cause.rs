@@ -74,13 +74,6 @@ pub(crate) enum Basis {
     TurnScatter(f64),
 }
 
-impl Basis {
-    /// Whether what an effect in the model leaves, its form being known roughly, may give such a finding.
-    pub(crate) const fn may_be_error_of_form(&self) -> bool {
-        matches!(self, Self::FailedTests(_) | Self::LargeErrors(_) | Self::Autocorrelated(..) | Self::TurnScatter(_))
-    }
-}
-
 /// Why a cause is not alone.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Doubt {

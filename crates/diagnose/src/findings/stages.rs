@@ -17,7 +17,6 @@ use crate::findings::lack_of_fit::lack_of_fit;
 use crate::findings::mean_lateness::join_clock;
 use crate::findings::noise_effects::scatter;
 use crate::findings::systematic_errors::without_systematic_errors;
-use crate::fits::model_comparison::form_error_statistic;
 use crate::fits::wald::wald_test;
 use crate::records::clock_drift::ClockDrift;
 use crate::records::clock_offsets::ClockOffset;
@@ -75,7 +74,7 @@ type Stage = fn(&StageResults<'_, '_>, Vec<Finding>) -> Vec<Finding>;
 
 /// The findings, record faults first, then by significance.
 pub(crate) fn findings(results: &StageResults<'_, '_>) -> Vec<Finding> {
-    let stages: [Stage; 20] = [
+    let stages: [Stage; 19] = [
         record_faults,
         extrinsics,
         mean_effects,
@@ -87,7 +86,6 @@ pub(crate) fn findings(results: &StageResults<'_, '_>) -> Vec<Finding> {
         noise_effects,
         faults_of_the_log,
         failed_checks,
-        without_errors_of_form,
         doubt_parts_of_stronger_findings,
         doubt_incomplete_models,
         without_what_doubts_say,
@@ -241,17 +239,6 @@ fn failed_checks(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> 
         let failed = finding::of_failed_checks(&structure.checked, results.without, refused);
         findings.extend(Rule::FailedChecks.finds(failed));
     }
-    findings
-}
-
-/// Failed checks and noise effects that are no more than the error of a larger effect's form are none beside
-/// it.
-fn without_errors_of_form(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
-    let least_z = form_error_statistic(results.structure.model()).sqrt();
-    findings.retain(|finding| {
-        let is_error = finding.basis.may_be_error_of_form() && finding.z < least_z;
-        !Rule::WithoutErrorsOfForm.applies(is_error)
-    });
     findings
 }
 

@@ -51,27 +51,17 @@ pub(crate) fn faults(
     base: Option<&ModelFit<'_>>,
     without: &[String],
 ) -> Result<Vec<Fault>, EstimationError> {
-    let outlying = Rule::VisibleFaultsOnly.applies(base.is_some_and(|base| {
-        rejected_share(base) > RECORDS.max_rejected_fraction
-            && measurements_per_run(base) < RECORDS.min_measurements_per_run
-    }));
-    let Some(first) = Rule::RecordFault.finds(fault(records, base, without, outlying)) else { return Ok(Vec::new()) };
+    let Some(first) = Rule::RecordFault.finds(fault(records, base, without)) else { return Ok(Vec::new()) };
     let second = {
         let base = PLAIN.fit(&sessions(&first.records))?;
         let without = [without, &[first.id.to_owned()]].concat();
-        Rule::SecondRecordFault.finds(fault(&first.records, Some(&base), &without, false))
+        Rule::SecondRecordFault.finds(fault(&first.records, Some(&base), &without))
     };
     Ok([Some(first), second].into_iter().flatten().collect())
 }
 
-fn measurements_per_run(fit: &ModelFit<'_>) -> f64 {
-    let runs = fit.solution.pass.runs.iter().filter(|run| run.count > 0.0).count();
-    fit.records.measurements() as f64 / runs.max(1) as f64
-}
-
-/// The fault that the log itself shows, or else that makes the data far likelier, if there is one;
-/// `outlying` leaves it at the former.
-fn fault(datasets: &[Dataset], base: Option<&ModelFit<'_>>, without: &[String], outlying: bool) -> Option<Fault> {
+/// The fault that the log itself shows, or else that makes the data far likelier, if there is one.
+fn fault(datasets: &[Dataset], base: Option<&ModelFit<'_>>, without: &[String]) -> Option<Fault> {
     let sound = base.is_some_and(is_sound);
     // The most specific trace first: jumps that are undone at once are also wraps.
     let sought: Vec<&'static str> = CATALOGUE
@@ -83,7 +73,7 @@ fn fault(datasets: &[Dataset], base: Option<&ModelFit<'_>>, without: &[String], 
         .copied()
         .collect();
     let of_effect = |id: &&'static str| match hypothesis(id) {
-        Some(Hypothesis::Records(corrections)) => explained_by(id, corrections, datasets, base, outlying),
+        Some(Hypothesis::Records(corrections)) => explained_by(id, corrections, datasets, base),
         _ => Vec::new(),
     };
     let explained: Vec<Vec<(bool, Fault)>> = sought.par_iter().map(of_effect).collect();
@@ -108,13 +98,9 @@ fn explained_by(
     corrections: fn(&Dataset) -> Vec<RecordCorrection>,
     datasets: &[Dataset],
     base: Option<&ModelFit<'_>>,
-    outlying: bool,
 ) -> Vec<(bool, Fault)> {
     let uncorrelated = base.is_some_and(|base| !is_correlated(base, &[]));
     let explains = |Form { values, sentence, visible_in_log, mistakes, records }: Form| {
-        if outlying && !visible_in_log {
-            return None;
-        }
         // By all measurements of the records: those that are not compared later count here.
         let compared = with_unknown_motion_of(datasets, &records);
         let fit = PLAIN.fit_to_compare(&sessions(&compared)).ok()?;
@@ -494,7 +480,7 @@ mod tests {
             std::mem::swap(left, right);
         }
         let base = fitted(&swapped);
-        let found = fault(&swapped, Some(&base), &[], false).expect("they are swapped");
+        let found = fault(&swapped, Some(&base), &[]).expect("they are swapped");
         assert_eq!(found.id, "swapped_wheels");
         let fit = fitted(&found.records);
         // The gain is that of the fit to the records without it. It ends where a step gains less than 0.01;
@@ -502,13 +488,12 @@ mod tests {
         let most = count(&base).max(count(&fit));
         let gain = cost(&base, most) + implausible(&base) - cost(&fit, most) - implausible(&fit);
         assert!((found.gain - gain).abs() < 0.05, "{} {gain}", found.gain);
-        // What leaves no trace is not sought in the log alone, nor where the fit is sound, nor if it is taken
+        // What leaves no trace is not sought where the fit is sound, nor if it is taken
         // out.
-        assert!(fault(&swapped, Some(&base), &[], true).is_none());
-        assert!(fault(&found.records, Some(&fit), &[], false).is_none());
-        let without = fault(&swapped, Some(&base), &["swapped_wheels".to_owned()], false);
+        assert!(fault(&found.records, Some(&fit), &[]).is_none());
+        let without = fault(&swapped, Some(&base), &["swapped_wheels".to_owned()]);
         assert!(without.is_none_or(|other| other.id != "swapped_wheels"));
         // Without a base fit any correction that makes a drive is a fault.
-        assert_eq!(fault(&swapped, None, &[], false).map(|of| of.id), Some("swapped_wheels"));
+        assert_eq!(fault(&swapped, None, &[]).map(|of| of.id), Some("swapped_wheels"));
     }
 }

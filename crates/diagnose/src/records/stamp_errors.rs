@@ -4,14 +4,13 @@
 //! much are therefore more than one linear term: what that term leaves resembles other effects.
 
 use dataset::Dataset;
-use estimation::{FitSettings, ModelFit, Thinning};
+use estimation::ModelFit;
 
 use crate::candidates::candidate::Candidate;
 use crate::fits::augmented_model::{AugmentedModel, cost, count, refit};
 use crate::fits::model_comparison::log_bayes_factor;
 use crate::fits::statistics::p_of_chi_square;
 use crate::fits::wald::{Test, cluster_robust_test, wald_test};
-use crate::records::record_faults::sessions;
 use crate::settings::{LEVELS, RECORDS};
 
 /// An error of the stamps, and the records without it.
@@ -134,44 +133,4 @@ pub(crate) fn stamp_error(datasets: &[Dataset], base: &ModelFit<'_>, catalogue: 
         })
     });
     found.max_by(|a, b| a.test.statistic.total_cmp(&b.test.statistic))
-}
-
-/// An error of stamps that do not tell of which tick each row is, as of rows that wait for each other: speeds
-/// by such stamps are nothing that a linear term could be made of. The records on their beat are compared
-/// with the records as they are, to which `base` is fitted.
-pub(crate) fn whole_stamp_error(
-    datasets: &[Dataset],
-    base: &ModelFit<'_>,
-    catalogue: &[Candidate],
-) -> Option<StampError> {
-    if base.thinning != Thinning::NONE || !have_uncertain_rows(datasets) {
-        return None;
-    }
-    let found = catalogue.iter().filter_map(|candidate| {
-        let restamped = candidate.restamped()?;
-        let records: Option<Vec<Dataset>> = datasets.iter().map(|dataset| restamped(dataset, 1.0, 0.0)).collect();
-        let records = records?;
-        let (count, cost_on_beat) = {
-            let fit = FitSettings::GEOMETRY_ONLY.fit(&sessions(&records)).ok()?;
-            let most = count(base).max(count(&fit));
-            (most, cost(&fit, most))
-        };
-        let explains = cost(base, count) - cost_on_beat;
-        let log_odds = explains - (catalogue.len() as f64).ln();
-        if log_odds < RECORDS.min_whole_restamping_log_odds {
-            return None;
-        }
-        let statistic = 2.0 * explains;
-        let estimates = vec![(1.0, statistic.sqrt().recip())];
-        let test = Test { statistic, p_value: p_of_chi_square(statistic, 1.0), estimates };
-        Some(StampError {
-            candidate: candidate.clone(),
-            test,
-            records,
-            is_undone_roughly: true,
-            log_odds,
-            explained: Some(Explained { cost: cost_on_beat, count, by: explains }),
-        })
-    });
-    found.max_by(|a, b| a.log_odds.total_cmp(&b.log_odds))
 }

@@ -151,10 +151,6 @@ rules::settings! {
     /// Fraction of the measurements. A base fit that rejects more as outliers is no model of the robot.
     /// Tuned: by hand; no record of what on.
     max_rejected_fraction: f64 = 0.2,
-    /// Measurements per run. With fewer, a fit that rejects too many may have diverged by itself: only faults
-    /// visible in the log are then corrected.
-    /// Tuned: by hand; no record of what on.
-    min_measurements_per_run: f64 = 3.0,
     /// Ranges of the four increments around it. An increment farther off is outlying.
     /// Tuned: by hand; no record of what on.
     outlying_row_ranges: f64 = 20.0,
@@ -249,10 +245,6 @@ rules::settings! {
     /// by this: rows whose place on the beat is not known stay late.
     /// Tuned: by hand, on single cases of the blind benchmark with stamps of receipt, which lose 2.5 %.
     max_restamping_loss: f64 = 0.05,
-    /// Log odds that records on their beat must have over the records as they are, where no linear term shows
-    /// that stamps are wrong.
-    /// Budgeted: one in 20,000, beside some dozens of other questions to a log.
-    min_whole_restamping_log_odds: f64 = 10.0,
     /// Standard deviations. Stamps are wrong by more than half of their irregularity, by counts alone, if the
     /// share is above a half by more.
     /// Derived: a normal deviation of as much has a probability of 0.001.

@@ -151,23 +151,6 @@ fn failed_checks_are_reported_where_nothing_explains_them() {
 }
 
 #[test]
-fn what_is_left_beside_a_plainer_effect_is_said_once() {
-    let datasets = [session(0, 0.0)];
-    let structure = structure(&datasets, &[]);
-    let left = |doubts: Vec<Doubt>, z: f64| {
-        let checks = of_causes(vec![], 1e-9, BTreeMap::new(), Basis::FailedTests(vec![Check::RunToRun]));
-        let tails = of_causes(vec![], 1e-9, BTreeMap::new(), Basis::Autocorrelated(0.3, ErrorsAtRest::Autocorrelated));
-        let all = vec![Finding { doubts, ..mean("slip_speed", 9.0) }, Finding { z, ..checks }, tails];
-        without_what_doubts_say(&results(&datasets, &structure), all).len()
-    };
-    assert_eq!((left(vec![Doubt::Incomplete], 8.9), left(vec![Doubt::OtherForm(Covariate::RunTime)], 8.9)), (2, 2));
-    assert_eq!(
-        (left(vec![Doubt::Incomplete], 9.1), left(vec![Doubt::LowSignificance], 8.9), left(vec![], 1.0)),
-        (3, 3, 3)
-    );
-}
-
-#[test]
 fn what_does_not_carry_over_is_doubted_and_what_is_of_low_significance_too() {
     let datasets = [session(0, 0.0)];
     let structure = structure(&datasets, &[]);
@@ -278,4 +261,21 @@ fn stamps_that_were_set_right_roughly_leave_what_has_no_name() {
     let of = StageResults { recorded: &waiting, ..results(&datasets, &structure) };
     let left = |share| without_remainders_of_stamps(&of, vec![of_stamps(share), unknown()]).len();
     assert_eq!((left(0.9), left(-0.9), left(0.0)), (1, 2, 2));
+}
+
+#[test]
+fn what_is_left_beside_a_plainer_effect_is_said_once() {
+    let datasets = [session(0, 0.0)];
+    let structure = structure(&datasets, &[]);
+    let left = |doubts: Vec<Doubt>, z: f64| {
+        let checks = of_causes(vec![], 1e-9, BTreeMap::new(), Basis::FailedTests(vec![Check::RunToRun]));
+        let tails = of_causes(vec![], 1e-9, BTreeMap::new(), Basis::Autocorrelated(0.3, ErrorsAtRest::Autocorrelated));
+        let all = vec![Finding { doubts, ..mean("slip_speed", 9.0) }, Finding { z, ..checks }, tails];
+        without_what_doubts_say(&results(&datasets, &structure), all).len()
+    };
+    assert_eq!((left(vec![Doubt::Incomplete], 8.9), left(vec![Doubt::OtherForm(Covariate::RunTime)], 8.9)), (2, 2));
+    assert_eq!(
+        (left(vec![Doubt::Incomplete], 9.1), left(vec![Doubt::LowSignificance], 8.9), left(vec![], 1.0)),
+        (3, 3, 3)
+    );
 }
