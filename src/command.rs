@@ -39,8 +39,8 @@ pub(crate) struct Cli {
     /// No progress, no remarks, and no lines on what was read or written: results and errors alone.
     #[arg(long, global = true)]
     quiet: bool,
-    /// TOML of an ablation: `off`, the rules that are switched off, and `decisions`, a file for how often each
-    /// rule decided.
+    /// TOML of an ablation: `off`, the rules that are switched off, and `decisions`, a file for how often
+    /// each rule decided.
     #[arg(long, global = true, hide = true, value_name = "FILE")]
     settings: Option<PathBuf>,
 }

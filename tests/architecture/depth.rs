@@ -1,5 +1,5 @@
-//! The longest way from `main` to the filter's update, function by function: whoever follows a diagnosis to the
-//! numbers reads so many functions and no more.
+//! The longest way from `main` to the filter's update, function by function: whoever follows a diagnosis to
+//! the numbers reads so many functions and no more.
 
 use syn::visit::{self, Visit};
 use syn::{Block, Ident, ImplItemFn, ItemFn};

@@ -1,5 +1,5 @@
-//! What the stages of a diagnosis found out, and the diagnosis that is made of it: findings, gain, limits, the
-//! next experiment, and the document.
+//! What the stages of a diagnosis found out, and the diagnosis that is made of it: findings, gain, limits,
+//! the next experiment, and the document.
 
 use calib::methods::joint::calibrated_drive;
 use calib::{CalibError, Calibration, CalibrationReport, MethodReport, Names};
@@ -72,8 +72,8 @@ pub struct FittedModel {
 
 impl Diagnosis {
     /// Whether what was found with all intervals compared explains what happened in those that another
-    /// diagnosis cuts: as a castor turns a robot wherever it reverses. Where it does not, what follows an event
-    /// are outliers.
+    /// diagnosis cuts: as a castor turns a robot wherever it reverses. Where it does not, what follows an
+    /// event are outliers.
     pub(crate) fn explains_events_of(&self, cut: &Self) -> bool {
         !self.found.candidates.is_empty() && self.outlier_share <= cut.outlier_share
     }

@@ -17,7 +17,8 @@ rules::settings! {
     /// Radians. Largest turn of a window: beyond, chord and heading no longer follow from one arc.
     /// Derived: below half a turn by the errors of nominal values.
     max_window_turn_rad: f64 = 2.0,
-    /// Ratio to the 90th percentile. A window whose instrument moves farther is an outlier of the instrument's.
+    /// Ratio to the 90th percentile. A window whose instrument moves farther is an outlier of the
+    /// instrument's.
     /// Budgeted: robots drive at most a few times as fast as usual.
     outlying_motion_ratio: f64 = 5.0,
     /// Residuals over their median absolute value, at which a window has half of its weight.
@@ -32,12 +33,12 @@ rules::settings! {
     /// Instants of a run at which its position or pose tells of the drive's parameters.
     /// Budgeted: the sides of a square have two each.
     instants: usize = 8,
-    /// Ratio of the smaller to the larger eigenvalue of the wheels' second moments, below which their motions are
-    /// all of one direction: straights alone, or spins alone.
+    /// Ratio of the smaller to the larger eigenvalue of the wheels' second moments, below which their motions
+    /// are all of one direction: straights alone, or spins alone.
     /// Budgeted: corrections of a heading while going straight are a hundredth of the motion, squared.
     collinear_ratio: f64 = 2e-3,
-    /// Ratio of the unexplained motion with a correction of the records to that without it, at the most, for the
-    /// correction to be believed.
+    /// Ratio of the unexplained motion with a correction of the records to that without it, at the most, for
+    /// the correction to be believed.
     /// Budgeted: twice as good a fit is no chance; other causes change it by less.
     decisive_ratio: f64 = 0.5,
     /// Nats. Log likelihood gained by a correction, at the least.
@@ -56,7 +57,8 @@ rules::settings! {
     /// Share of the motion that is left unexplained by records that have nothing to do with the robot.
     /// Budgeted: of independent motions a straight line explains 1/n.
     unrelated: f64 = 0.95,
-    /// Seconds. Farthest offset of the clocks that is looked for beside the one that lets the records overlap.
+    /// Seconds. Farthest offset of the clocks that is looked for beside the one that lets the records
+    /// overlap.
     /// Convention: clocks that nobody set are minutes apart.
     max_clock_offset_s: f64 = 600.0,
     /// Seconds. Farthest offset that is looked for where the records explain each other without one.
@@ -74,13 +76,14 @@ rules::settings! {
     /// Seconds. Offset that no fit of a latency reaches from 0.
     /// Budgeted: three standard deviations of its prior.
     max_fitted_offset_s: f64 = 0.3,
-    /// Share of half a row by which a delay may differ from it, beside its own error, and be that of rates of the
-    /// instant.
-    /// Budgeted: offsets are looked for in steps of 2 ms, and a robot that speeds up within a row is seen later.
+    /// Share of half a row by which a delay may differ from it, beside its own error, and be that of rates of
+    /// the instant.
+    /// Budgeted: offsets are looked for in steps of 2 ms, and a robot that speeds up within a row is seen
+    /// later.
     half_row_share: f64 = 0.15,
     /// Share of what a delay gains by which rates of the instant may explain less than it.
-    /// Budgeted: the best of many offsets gains by chance, and by smoothing between rows; one and a half per cent
-    /// with simulated robots at 20 Hz.
+    /// Budgeted: the best of many offsets gains by chance, and by smoothing between rows; one and a half per
+    /// cent with simulated robots at 20 Hz.
     delay_gain_share: f64 = 0.05,
     /// Share of the windows that must lie within both records at an offset that is looked at.
     /// Budgeted: a match of half of the records is no accident of one manoeuvre.
@@ -97,8 +100,8 @@ rules::settings! {
     /// Relative. Clock rate from which on no result is right.
     /// Budgeted: wheels at a steady speed are off by as much, ten times what calibrations promise.
     max_clock_rate: f64 = 5e-4,
-    /// Ratio to the stated value, or its inverse, that calibration corrects; beyond, the log says something else
-    /// than it means.
+    /// Ratio to the stated value, or its inverse, that calibration corrects; beyond, the log says something
+    /// else than it means.
     /// Convention: wheels are known to a few per cent; `calib` remarks on the same ratio.
     max_wheel_ratio: f64 = 1.3,
     /// As for wheels, of the wheel separation.
@@ -125,17 +128,18 @@ rules::settings! {
     /// Relative. Separations of one robot differ from session to session by less.
     /// Convention: floors and loads change an effective separation by up to 8 %, skid steering more.
     same_separation: f64 = 0.12,
-    /// Radians. Headings of the instrument that are nearer to those of the wheels, all of them, are computed from
-    /// the wheels.
+    /// Radians. Headings of the instrument that are nearer to those of the wheels, all of them, are computed
+    /// from the wheels.
     /// Convention: no instrument is better than 1e-4, and no robot goes straight so well.
     own_heading_rad: f64 = 1e-4,
-    /// Relative. Distances of the instrument that are nearer to those of the wheels are computed from the wheels.
+    /// Relative. Distances of the instrument that are nearer to those of the wheels are computed from the
+    /// wheels.
     /// Convention: wheels are known to a per cent before they are calibrated.
     own_distance: f64 = 1e-3,
     /// Radians. Turns of the instrument from one pose to the next that are nearer to those of the wheels are
     /// computed from the wheels.
-    /// Convention: half of what the heading of the best instrument errs by; poses in files of four decimals keep
-    /// within it.
+    /// Convention: half of what the heading of the best instrument errs by; poses in files of four decimals
+    /// keep within it.
     own_step_rad: f64 = 5e-5,
     /// Radians. Least turn of a step that is compared for it.
     /// Derived: wheels that are off by half a per cent miss it by as much as `OWN_STEP_RAD`.
@@ -248,8 +252,8 @@ rules::settings! {
     /// Budgeted: steps of a fit are of this size, and a start that is nearer gains nothing.
     max_start_sigma: f64 = 0.1,
     /// Seconds. Length of the windows in which a gyroscope's turns give a separation to start from.
-    /// Budgeted: what wheels of a skid-steered robot err by in a window dilutes the separation by a thirtieth; in
-    /// half a second by a sixth.
+    /// Budgeted: what wheels of a skid-steered robot err by in a window dilutes the separation by a
+    /// thirtieth; in half a second by a sixth.
     gyro_window_s: f64 = 2.0,
 }
 

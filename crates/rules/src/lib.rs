@@ -39,7 +39,8 @@ rules! {
     UnknownMotions,
     /// Contamination: runs with another mounting of the instrument are left out.
     OtherExtrinsics,
-    /// Contamination: what was found with all intervals compared is taken where it explains the others' events.
+    /// Contamination: what was found with all intervals compared is taken where it explains the others'
+    /// events.
     WholeWithoutEvents,
     /// Records: a fault of the records is undone.
     RecordFault,
@@ -75,7 +76,7 @@ rules! {
     SearchIfDependent,
     /// Search: sparse terms where residuals depend on something still.
     TermsIfDependent,
-    /// Scan: a score below the form error of a larger effect is none.
+    /// Scan: a score below the form error of a larger effect does not count.
     FormErrorInScan,
     /// Scan: candidates that the encoders do not resolve are not tested.
     Unresolved,
@@ -111,7 +112,7 @@ rules! {
     PredictsWorse,
     /// Search: an effect with which held-out runs drift more is refused.
     DriftsMore,
-    /// Search: an effect of which no cause is significant beside the others is refused.
+    /// Search: an effect without a cause that is significant given the others is refused.
     Unconfirmed,
     /// Causes: differences between delays count in units of their scatter over runs.
     DelayScatter,
@@ -141,7 +142,7 @@ rules! {
     WithoutWhatDoubtsSay,
     /// Findings: effects of low significance are doubted.
     LowSignificance,
-    /// Findings: an effect that does not carry over is doubted.
+    /// Findings: an effect that other sessions and paths do not have is doubted.
     DoesNotCarryOver,
     /// Findings: what the errors of a map or of rounded rates explain is left out.
     SystematicErrors,
@@ -301,8 +302,8 @@ macro_rules! settings {
     };
 }
 
-/// The settings of a crate by subject, each with the static that the crate reads. They can be installed once a
-/// process, before any of them is read.
+/// The settings of a crate by subject, each with the static that the crate reads. They can be installed once
+/// a process, before any of them is read.
 #[macro_export]
 macro_rules! rooms {
     ($($subject:ident: $name:path as $read:ident,)*) => {

@@ -1,5 +1,5 @@
-//! Records as faults and effects are sought in them: stamps that the counts show to be wrong, clocks, and what
-//! does not belong are set right before any fit.
+//! Records as faults and effects are sought in them: stamps that the counts show to be wrong, clocks, and
+//! what does not belong are set right before any fit.
 
 use dataset::Dataset;
 use rayon::prelude::*;

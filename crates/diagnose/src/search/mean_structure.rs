@@ -140,8 +140,8 @@ struct Searched<'a> {
 }
 
 impl Searched<'_> {
-    /// Where residuals are autocorrelated: sparse terms if they explain that. Autocorrelated measurements taken
-    /// as independent make any effect too significant.
+    /// Where residuals are autocorrelated: sparse terms if they explain that. Autocorrelated measurements
+    /// taken as independent make any effect too significant.
     fn explain_autocorrelation(&mut self) -> Option<Autocorrelation> {
         let Self { base, model } = self;
         if model.unlisted.is_some() || is_white(&model.checked) {
@@ -162,9 +162,9 @@ impl Searched<'_> {
     }
 }
 
-/// The effects with a base fit, and one sparse term against them. Where instants are noisy beside the effects,
-/// the base fit with that noise, and the effects with it: motion that stamps do not tell resembles effects
-/// that grow with speed.
+/// The effects with a base fit, and one sparse term against them. Where instants are noisy beside the
+/// effects, the base fit with that noise, and the effects with it: motion that stamps do not tell resembles
+/// effects that grow with speed.
 fn search_among_all<'a>(base: ModelFit<'a>, catalogue: &[Candidate]) -> Searched<'a> {
     let found = search(FitCache::of(&base), catalogue, LEVELS.scan_level);
     let (base, found) = match Rule::TimingNoise.finds(noisy_base(&base, &found.model)) {

@@ -82,7 +82,8 @@ pub(crate) fn rivals<'a>(
     let mut contenders = contenders(entries, best);
     let best_variants: Vec<Candidate> = contenders.iter().map(|entry| entry.scored.candidate.clone()).collect();
     // Models that each have one of these candidates more, without those that diverge. While a fit goes on it
-    // holds the propagations of all runs, and its passes take all cores by themselves: only a few go on at a time.
+    // holds the propagations of all runs, and its passes take all cores by themselves: only a few go on at a
+    // time.
     let mut fit_each = |added: &[Candidate]| {
         let with = |candidate: &Candidate| {
             let mut candidates = without.candidates.clone();

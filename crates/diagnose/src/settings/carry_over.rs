@@ -5,8 +5,8 @@ rules::settings! {
     /// Standard deviations. A unit is asked where the others determine the size so well.
     /// Convention: three standard deviations.
     min_sigmas_of_others: f64 = 3.0,
-    /// Standard deviations. Half of the others' size over the standard deviation of the contrast: a unit is asked
-    /// where it would show that size.
+    /// Standard deviations. Half of the others' size over the standard deviation of the contrast: a unit is
+    /// asked where it would show that size.
     /// Derived: Φ⁻¹(0.95) + Φ⁻¹(0.9), power 0.9 at a one-sided level of 5 %.
     min_power_sigmas: f64 = 2.93,
     /// Number. Testable units that must agree.

@@ -14,8 +14,8 @@ rules::settings! {
     /// Probability. Level at which a sparse term beside the effects found says that they are incomplete.
     /// Convention: 5 %.
     lack_of_fit_level: f64 = 0.05,
-    /// Odds. None of the causes of a finding of low significance is right; of other findings forty-nine of fifty
-    /// hold the right one.
+    /// Odds. None of the causes of a finding of low significance is right; of other findings forty-nine of
+    /// fifty hold the right one.
     /// Tuned: on the blind benchmark.
     none_of_causes_odds: f64 = 3.0 / 7.0,
     /// Probability. Level of dependence on something recorded that no noise effect explains.

@@ -17,11 +17,12 @@ rules::settings! {
     /// Most rows of the stretches that are diagnosed, together, where measurements are few.
     /// Budgeted: a quarter of a gigabyte, at half a kilobyte a row.
     subsample_rows: usize = 1 << 19,
-    /// Stretches that are diagnosed for each fault of the records that counts show by themselves, beside those
-    /// that are spread over the log.
+    /// Stretches that are diagnosed for each fault of the records that counts show by themselves, beside
+    /// those that are spread over the log.
     /// Budgeted: an eighth of the stretches, for each fault.
     max_faulty_stretches: usize = 4,
-    /// The fractional part of its multiples is spread over [0, 1) more evenly than that of any other number's.
+    /// The fractional part of its multiples is spread over [0, 1) more evenly than that of any other
+    /// number's.
     /// Derived: the golden section, (√5 − 1)/2.
     golden_section: f64 = 0.618_033_988_749_894_9,
 }

@@ -19,8 +19,8 @@ rules::settings! {
     /// measurements.
     /// Convention: 5 %, two-sided.
     cluster_robust_level: f64 = 0.05,
-    /// Probability. Level at which turns scatter more than the wheels explain; any other error of the model makes
-    /// turns differ from run to run too.
+    /// Probability. Level at which turns scatter more than the wheels explain; any other error of the model
+    /// makes turns differ from run to run too.
     /// Tuned: by hand; no record of what on.
     turn_scatter_level: f64 = 1e-7,
     /// Number. Fewer runs do not tell how runs differ; to be held out, they are cut into blocks.
@@ -42,8 +42,8 @@ rules::settings! {
     /// Standard deviations. Two-sided 95 % quantile of a normal variable.
     /// Derived: Φ⁻¹(0.975).
     normal_quantile_95: f64 = 1.96,
-    /// Number. Degrees of freedom that Student's quantile is asked for at the most: with more it is the normal
-    /// one to 2e-5.
+    /// Number. Degrees of freedom that Student's quantile is asked for at the most: with more it is the
+    /// normal one to 2e-5.
     /// Budgeted: from 10⁶ on the library's search for it errs by more.
     max_student_freedom: f64 = 1e5,
     /// Standard deviations. One-sided 95 % quantile of a normal variable.
@@ -52,7 +52,8 @@ rules::settings! {
     /// Radians. Prior standard deviation of the heading of the instrument on the robot.
     /// Tuned: by hand; no record of what on.
     sensor_heading_prior_sigma_rad: f64 = 0.3,
-    /// Probability. Below this the standard normal quantile is taken from the statistic, not from the p-value.
+    /// Probability. Below this the standard normal quantile is taken from the statistic, not from the
+    /// p-value.
     /// Derived: some decades above the smallest normal double, 2e-308.
     min_quantile_p_value: f64 = 1e-290,
 }

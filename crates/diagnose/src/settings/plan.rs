@@ -60,8 +60,8 @@ rules::settings! {
     /// Metres. Shorter motions are lost in the noise of the measurements.
     /// Tuned: by hand; no record of what on.
     min_manoeuvre_length_m: f64 = 0.2,
-    /// Seconds. Standstill before and after a planned run; without it, effects of starting would be discriminated
-    /// better than in any real log.
+    /// Seconds. Standstill before and after a planned run; without it, effects of starting would be
+    /// discriminated better than in any real log.
     /// Tuned: by hand; no record of what on.
     standstill_s: f64 = 0.5,
     /// Ratio of times. Two manoeuvres must save the rest against one.

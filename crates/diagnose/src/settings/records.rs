@@ -2,8 +2,8 @@
 
 rules::settings! {
     Records
-    /// Natural logarithm. A correction of the records is a fault if it raises the log likelihood by more; dozens
-    /// of corrections are tried.
+    /// Natural logarithm. A correction of the records is a fault if it raises the log likelihood by more;
+    /// dozens of corrections are tried.
     /// Tuned: by hand; no record of what on.
     min_fault_log_likelihood_gain: f64 = 20.0,
     /// Natural logarithm of odds. Cost of each mistake beyond the first that a fault of the records takes.
@@ -21,8 +21,8 @@ rules::settings! {
     /// Seconds. An offset of all runs that is taken off before the fit.
     /// Budgeted: a tenth of a second and less is estimated with everything else.
     min_common_clock_offset_s: f64 = 0.15,
-    /// Seconds. The same where the fit takes many measurements for outliers: the instrument is too precise for
-    /// the offset to be estimated with everything else.
+    /// Seconds. The same where the fit takes many measurements for outliers: the instrument is too precise
+    /// for the offset to be estimated with everything else.
     /// Budgeted: three standard deviations of an offset that a few runs determine to five milliseconds.
     min_rejecting_clock_offset_s: f64 = 0.015,
     /// Standard deviations. A run's own clock is off by as many of its estimate at the least.
@@ -31,8 +31,8 @@ rules::settings! {
     /// Natural logarithm. Likelihood that an offset gains at the least.
     /// Convention: as for corrections of the records.
     min_clock_gain: f64 = 20.0,
-    /// Fraction. Share of the turns and distances between poses that counts leave unexplained where their clock
-    /// is right; of counts that leave more, nothing is said.
+    /// Fraction. Share of the turns and distances between poses that counts leave unexplained where their
+    /// clock is right; of counts that leave more, nothing is said.
     /// Budgeted: swapped wheels leave four times what there
     /// is.
     max_clock_unexplained: f64 = 0.5,
@@ -48,8 +48,8 @@ rules::settings! {
     /// Number. Of so many runs one may have a clock of its own; where more have, their errors are no clock's.
     /// Convention: one in ten.
     min_runs_per_odd_clock: usize = 10,
-    /// Ratio to the fastest wheel of the run. A robot whose wheels are slower in the first row sets off there,
-    /// and one whose are in the last row comes to rest.
+    /// Ratio to the fastest wheel of the run. A robot whose wheels are slower in the first row sets off
+    /// there, and one whose are in the last row comes to rest.
     /// Budgeted: a row of 50 ms of a robot that takes half a second to its speed has a twentieth on average.
     max_rate_at_rest: f64 = 0.1,
     /// Number. Fewer pairs of poses do not say an offset.
@@ -83,11 +83,12 @@ rules::settings! {
     /// Relative. Prior standard deviation of the wheel separation, to which skid steering adds.
     /// Tuned: by hand; no record of what on.
     separation_prior_sigma: f64 = 0.3,
-    /// Standard deviations of the prior. Largest deviation of a wheel's size from nominal of a plausible drive.
+    /// Standard deviations of the prior. Largest deviation of a wheel's size from nominal of a plausible
+    /// drive.
     /// Tuned: by hand; no record of what on.
     max_wheel_deviation_sigmas: f64 = 2.0,
-    /// Standard deviations of the prior. Largest deviation of the wheel separation from nominal of a plausible
-    /// drive.
+    /// Standard deviations of the prior. Largest deviation of the wheel separation from nominal of a
+    /// plausible drive.
     /// Tuned: by hand; no record of what on.
     max_separation_deviation_sigmas: f64 = 1.5,
     /// Relative. A wheel separation that is calibrated farther from the stated one is a finding.
@@ -110,8 +111,8 @@ rules::settings! {
     /// drive by this.
     /// Tuned: by hand; no record of what on.
     uncorrelated_noise_factor: f64 = 3.0,
-    /// Fraction of the extent of the measured path, and radians. Measurements with a larger standard deviation
-    /// are uncorrelated with the motion.
+    /// Fraction of the extent of the measured path, and radians. Measurements with a larger standard
+    /// deviation are uncorrelated with the motion.
     /// Tuned: by hand; no record of what on.
     uncorrelated_measurement_sigma: f64 = 0.3,
     /// Relative standard deviation. Where all measurements together determine both wheels' sizes better than
@@ -119,20 +120,20 @@ rules::settings! {
     /// Budgeted: by accident wheels that do not move the robot are as large as stated to 2 % once in fifty
     /// times.
     max_correlated_wheel_sigma: f64 = 0.02,
-    /// Ratio. Largest wheel noise of a fit without a fault over that with it, where it is more than a plausible
-    /// drive's. Rows that were lost beside a fault leave some.
+    /// Ratio. Largest wheel noise of a fit without a fault over that with it, where it is more than a
+    /// plausible drive's. Rows that were lost beside a fault leave some.
     /// Budgeted: a sixteenth of the variance, which no accident of some tens of measurements gives.
     max_remaining_noise_ratio: f64 = 0.25,
-    /// Fraction of the measurements. With more outliers, a fit is not sound and faults without a trace in the log
-    /// are tried.
+    /// Fraction of the measurements. With more outliers, a fit is not sound and faults without a trace in the
+    /// log are tried.
     /// Tuned: by hand; no record of what on.
     max_sound_outlier_fraction: f64 = 0.01,
     /// Ratio. Outliers after a correction of the records over those before it; tails may be heavy, and lost
     /// counts are restored roughly.
     /// Tuned: by hand; no record of what on.
     max_remaining_outlier_ratio: f64 = 0.5,
-    /// Fraction of the measurements. Outliers that are accepted after a correction of the records, however few
-    /// there were before.
+    /// Fraction of the measurements. Outliers that are accepted after a correction of the records, however
+    /// few there were before.
     /// Tuned: by hand; no record of what on.
     max_corrected_outlier_fraction: f64 = 0.1,
     /// Radians. A correction of the records that turns the instrument farther on the robot is refused.
@@ -163,7 +164,8 @@ rules::settings! {
     /// Counts. Least range of increments.
     /// Derived: two increments of a steady wheel each round by one count.
     count_rounding: f64 = 2.0,
-    /// Ratio. A wheel slower than this share of its mean rate around a row stands; a robot may stop for a row.
+    /// Ratio. A wheel slower than this share of its mean rate around a row stands; a robot may stop for a
+    /// row.
     /// Tuned: by hand; no record of what on.
     standstill_rate_ratio: f64 = 0.1,
     /// Probability. Level of the test of the log's rows.
@@ -172,7 +174,8 @@ rules::settings! {
     /// Ratio. A log whose span differs from that of the measurements by more is of another clock.
     /// Tuned: by hand; no record of what on.
     max_clock_ratio: f64 = 30.0,
-    /// Wheel separations. Distance over which windows between measured poses calibrate the wheels before any fit.
+    /// Wheel separations. Distance over which windows between measured poses calibrate the wheels before any
+    /// fit.
     /// Convention: a half; over less, noise of the instrument is most of it.
     window_distance_separations: f64 = 0.5,
     /// Numbers of measurements that a window spans.
@@ -197,11 +200,12 @@ rules::settings! {
     /// Standard deviations, by the 90 % quantile of all windows of that span.
     /// Convention: beyond what normal errors do in any log.
     min_unknown_sigmas: f64 = 10.0,
-    /// Standard deviations of a longer window that a displacement has to be, for the window to tell whether it
-    /// lasts.
+    /// Standard deviations of a longer window that a displacement has to be, for the window to tell whether
+    /// it lasts.
     /// Derived: half of it is asked for, which is then four standard deviations.
     min_surrounding_sigmas: f64 = 8.0,
-    /// Seconds before and after a displacement in which it may be undone: rows that are stamped late catch up.
+    /// Seconds before and after a displacement in which it may be undone: rows that are stamped late catch
+    /// up.
     /// Budgeted: ten times the mean lateness of rows that a busy computer receives, 50 ms.
     max_undone_s: f64 = 0.5,
     /// Share of all pairs of measurements. Where more are beyond the wheels, the noise is, or the model.
@@ -241,15 +245,16 @@ rules::settings! {
     /// Median lengths of a row. A row that lasts longer has others missing before it.
     /// Convention: nearer to two than to one, and beyond ordinary jitter.
     min_gap_ratio: f64 = 1.8,
-    /// Fraction of what the linear term of a stamp error explains. Restamped records may explain less of the data
-    /// by this: rows whose place on the beat is not known stay late.
+    /// Fraction of what the linear term of a stamp error explains. Restamped records may explain less of the
+    /// data by this: rows whose place on the beat is not known stay late.
     /// Tuned: by hand, on single cases of the blind benchmark with stamps of receipt, which lose 2.5 %.
     max_restamping_loss: f64 = 0.05,
     /// Standard deviations. Stamps are wrong by more than half of their irregularity, by counts alone, if the
     /// share is above a half by more.
     /// Derived: a normal deviation of as much has a probability of 0.001.
     min_share_sigmas: f64 = 3.0,
-    /// Mean of what stamps are late by, over what they vary by about their beat, root mean square, at the most.
+    /// Mean of what stamps are late by, over what they vary by about their beat, root mean square, at the
+    /// most.
     /// Budgeted: of exponential delays it is 1, and more where rows that are late hold up others.
     max_mean_lateness_ratio: f64 = 2.0,
     /// What the mean of restored delays is off by, over what stamps vary by, root mean square, at the most.

@@ -14,19 +14,21 @@ rules::settings! {
     /// Budgeted: an inflation
     /// is known to a third, and a p-value of 1e-4 by Student's t needs z = 4.7 in place of 3.7.
     resimulations: u64 = 20,
-    /// Standard deviations. Where simulated runs are less significant, they count as this: the likelihood ratio
-    /// of a variance at its boundary is 0 and its p-value 1 every other time, which is no scatter of the upper
-    /// tail.
+    /// Standard deviations. Where simulated runs are less significant, they count as this: the likelihood
+    /// ratio of a variance at its boundary is 0 and its p-value 1 every other time, which is no scatter of
+    /// the upper tail.
     /// Derived: a normal variable cut there has a mean of 0.08 and a standard deviation of 0.87.
     lowest_simulated_z: f64 = -1.0,
-    /// Probability. Tests with a smaller p-value by formula are judged by simulation where encoders are coarse.
+    /// Probability. Tests with a smaller p-value by formula are judged by simulation where encoders are
+    /// coarse.
     /// Budgeted: what has a larger one fails no test at 1 %.
     resimulated_level: f64 = 0.01,
     /// Number. Poses of a robot that stands which say whether the instrument's errors last.
     /// Derived: the lag-one coefficient of so many is known to 0.18.
     min_poses_at_rest: usize = 30,
     /// How many rates of decay errors at rest are compared with, each half of the one before.
-    /// Derived: the slowest lasts a hundred times as long as the autocorrelation of the residuals says at least.
+    /// Derived: the slowest lasts a hundred times as long as the autocorrelation of the residuals says at
+    /// least.
     decays_at_rest: i32 = 8,
     /// Number. Poses of a standstill that are compared with each other; a longer one counts as several.
     /// Budgeted: a correlation of so many is factored in a millisecond.
@@ -46,8 +48,8 @@ rules::settings! {
     /// Probability. An outlier is persistent if the measurement after it has a smaller p-value.
     /// Tuned: by hand; no record of what on.
     after_outlier_level: f64 = 0.01,
-    /// Fraction of a measurement's variance. Where the motion within rows has more, neither size nor tails are
-    /// tested.
+    /// Fraction of a measurement's variance. Where the motion within rows has more, neither size nor tails
+    /// are tested.
     /// Derived: what has a tenth of a variance has a hundredth of its kurtosis.
     max_within_row_share: f64 = 0.1,
     /// Standard deviations. Larger innovations are of the tail whose persistence is tested.
@@ -56,8 +58,8 @@ rules::settings! {
     /// Standard errors. Level at which the innovations after large ones are persistent or reverting.
     /// Convention: 1 %, two-sided, of a normal variable.
     persistence_sigmas: f64 = 2.6,
-    /// Ratio of Mahalanobis distances. Two displacements cancel if together they are off by less than this share
-    /// of the outlier.
+    /// Ratio of Mahalanobis distances. Two displacements cancel if together they are off by less than this
+    /// share of the outlier.
     /// Derived: an outlier is off by 5 standard deviations at the least, the sum of two right ones by √2.
     cancellation_ratio: f64 = 0.5,
     /// Number. Fewer innovations are not tested for whiteness.
@@ -75,8 +77,8 @@ rules::settings! {
     /// Probability. Family-wise level at which outliers are a noise effect.
     /// Tuned: by hand; no record of what on.
     noise_effect_level: f64 = 1e-3,
-    /// Probability. Level of dependence on something recorded where tails are heavy: a few large errors make the
-    /// test of dependence fail.
+    /// Probability. Level of dependence on something recorded where tails are heavy: a few large errors make
+    /// the test of dependence fail.
     /// Tuned: by hand; no record of what on.
     dependence_beyond_tails_level: f64 = 1e-6,
     /// Fraction of the measurements. With more outliers the model errs, not the measurements.

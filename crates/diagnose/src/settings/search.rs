@@ -12,8 +12,8 @@ rules::settings! {
     /// Budgeted: a part costs an eighth of a search among the 133,000 measurements of 102 runs; its
     /// autocorrelation is certain to a hundredth (1/√16384).
     measurements_of_part: f64 = 16_384.0,
-    /// Share of all measurements. A larger part saves little where it says that measurements have to be thinned,
-    /// and costs its share where not.
+    /// Share of all measurements. A larger part saves little where it says that measurements have to be
+    /// thinned, and costs its share where not.
     /// Budgeted: a third more time at the most.
     max_share_of_part: f64 = 1.0 / 3.0,
     /// Runs of a part. Fewer do not have all kinds of paths, nor do intervals over runs hold.
@@ -32,18 +32,20 @@ rules::settings! {
     /// plausible.
     /// Derived: 2⁻¹⁰ is a thousandth.
     prior_scales: i32 = 11,
-    /// Columns. Largest number of candidates' columns in one pass: a whole number of products on three channels.
+    /// Columns. Largest number of candidates' columns in one pass: a whole number of products on three
+    /// channels.
     /// Tuned: by hand, on the time of a diagnosis.
     max_columns_per_pass: usize = 126,
     /// Seconds. Rows of a faster log are taken together in scans.
-    /// Tuned: by hand, on an hour of 100 Hz: z of 25 of 27 candidates stays within 0.06 of that by single rows.
+    /// Tuned: by hand, on an hour of 100 Hz: z of 25 of 27 candidates stays within 0.06 of that by single
+    /// rows.
     decimation_step_s: f64 = 0.1,
     /// Natural logarithm per component. Cost of a component of a rejected measurement beside its variance.
     /// Derived: half of the outlier gate's χ² of three degrees of freedom, over its three components.
     outlier_cost: f64 = 0.5 * 25.9 / 3.0,
     /// Number. Refits of candidates that go on at a time.
-    /// Budgeted: one needs 150 bytes a measurement beside what all share, and two occupy the cores where runs are
-    /// few.
+    /// Budgeted: one needs 150 bytes a measurement beside what all share, and two occupy the cores where runs
+    /// are few.
     max_fits_at_a_time: usize = 2,
     /// Fraction of the measurements that the fit before took. A refit that takes fewer has diverged.
     /// Tuned: by hand; no record of what on.
@@ -60,10 +62,11 @@ rules::settings! {
     /// Number. So many of these are refitted at the most.
     /// Budgeted: a refit costs as much as a scan, and causes that are alike have the same ratio.
     max_refitted_by_score: usize = 3,
-    /// Share of the motion in a term's information, the rest being the rounding of counts in the rates that it
-    /// goes by, below which the encoders do not resolve it.
-    /// Budgeted: below it a size is nearer to nothing than to the truth. At 0.9 drifting clocks and delays that
-    /// large logs show well are lost to coarse encoders, and what is not in the catalogue comes in their place.
+    /// Share of the motion in a term's information, the rest being the rounding of counts in the rates that
+    /// it goes by, below which the encoders do not resolve it.
+    /// Budgeted: below it a size is nearer to nothing than to the truth. At 0.9 drifting clocks and delays
+    /// that large logs show well are lost to coarse encoders, and what is not in the catalogue comes in their
+    /// place.
     min_reliability: f64 = 0.5,
     /// Half-widths of the 95 % interval. An effect is refused if odometry drifts more with it by more; at one
     /// half-width an effect that leaves the drift alone would be refused once in forty times.
@@ -92,8 +95,8 @@ rules::settings! {
     /// Number. Further variants that are tried of an effect whose best variant has unphysical estimates.
     /// Tuned: by hand; no record of what on.
     max_further_variants: usize = 3,
-    /// Ratio of variances. Contacts that scatter by more than this over a measurement's variance would show in
-    /// the noise; sticking wheels reach 2.7, backlash that is taken for them 6.8.
+    /// Ratio of variances. Contacts that scatter by more than this over a measurement's variance would show
+    /// in the noise; sticking wheels reach 2.7, backlash that is taken for them 6.8.
     /// Tuned: on the blind benchmark.
     max_contact_variance_ratio: f64 = 4.0,
     /// Standard deviations. A smaller estimate counts as zero when an effect is checked for being physical.

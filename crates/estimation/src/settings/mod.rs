@@ -67,10 +67,12 @@ rules::settings! {
     /// Centre of the prior of the turn noise, rad/√rad.
     /// Tuned: by hand; no record of what on.
     turn_prior_sigma: f64 = 1e-3,
-    /// Centre of the prior of a measured coordinate's standard deviation, metres, where the dataset states none.
+    /// Centre of the prior of a measured coordinate's standard deviation, metres, where the dataset states
+    /// none.
     /// Convention: instruments err by tenths of a millimetre to centimetres.
     position_prior_sigma_m: f64 = 1e-3,
-    /// Centre of the prior of a measured heading's standard deviation, radians, where the dataset states none.
+    /// Centre of the prior of a measured heading's standard deviation, radians, where the dataset states
+    /// none.
     /// Tuned: by hand; no record of what on.
     heading_prior_sigma_rad: f64 = 3e-3,
     /// Standard deviation of ln σ under the prior where nothing is stated: a factor of e² either way.
@@ -92,15 +94,17 @@ rules::settings! {
     /// Prior standard deviation of a group's sensor heading about the common one, radians.
     /// Convention: a marker is put back with a turn that one does not see.
     extrinsics_prior_sigma_rad: f64 = 0.1,
-    /// A group's column is observable when its posterior standard deviation is below this share of the prior one.
+    /// A group's column is observable when its posterior standard deviation is below this share of the prior
+    /// one.
     /// Tuned: by hand; no record of what on.
     max_posterior_to_prior_sigma: f64 = 0.5,
-    /// Relative. A stated length that is farther from what the windows of motion show is not where a fit starts.
+    /// Relative. A stated length that is farther from what the windows of motion show is not where a fit
+    /// starts.
     /// Budgeted: from a quarter away, which is as far as rulers and tyres go, steps end in the same minimum
     /// (tests/command/misdeclared.rs).
     min_start_deviation: f64 = 0.22,
-    /// Seconds. A clock that is seen to be farther off is taken off the stamps before the fit, and its rest is
-    /// fitted.
+    /// Seconds. A clock that is seen to be farther off is taken off the stamps before the fit, and its rest
+    /// is fitted.
     /// Budgeted: the fit of a latency from 0 ends at a smaller one (tests/command/bad_logs.rs).
     min_start_clock_s: f64 = 0.05,
     /// Sensor heading, radians, beyond which the extrinsics are free from the first fit on.
@@ -108,8 +112,8 @@ rules::settings! {
     /// Tuned: by hand; no record of what on.
     rotated_sensor_rad: f64 = 0.2,
     /// The same where windows of motion determine the drive.
-    /// Tuned: on a tag turned by 3 to 10° and up to 150 ms late (tests/command/moved_instrument.rs): without its
-    /// heading, the first fit did not converge.
+    /// Tuned: on a tag turned by 3 to 10° and up to 150 ms late (tests/command/moved_instrument.rs): without
+    /// its heading, the first fit did not converge.
     turned_sensor_rad: f64 = 0.05,
     /// Ratio of chord to distance below which a motion has no direction for the sensor's heading.
     /// Tuned: by hand; no record of what on.
@@ -134,7 +138,8 @@ rules::settings! {
     /// Budgeted: milliseconds are off by 0.29 ms.
     max_rounding_s: f64 = 5e-4,
     /// Share of a row that stamps jitter by at the least for a log to have a beat that they are late against:
-    /// rows of a slow log jitter by much less than 5 %, and displace the robot by more than an instrument errs.
+    /// rows of a slow log jitter by much less than 5 %, and displace the robot by more than an instrument
+    /// errs.
     /// Convention: that of the sampling period.
     min_beat_jitter: f64 = 0.02,
     /// Steps that must be there before angles are taken for counts.
@@ -143,8 +148,8 @@ rules::settings! {
     /// Share of steps that are multiples of the smallest one, from which on angles are counts.
     /// Budgeted: chance has a tenth of them within a twentieth.
     min_grid_fraction: f64 = 0.98,
-    /// Variance that rounding adds to a pose, over that of a measurement, from which on distributions of tests
-    /// are found by simulation.
+    /// Variance that rounding adds to a pose, over that of a measurement, from which on distributions of
+    /// tests are found by simulation.
     /// Budgeted: below it, a statistic's variance is off by a twentieth of its excess at
     /// the most.
     min_resimulated_variance_ratio: f64 = 0.05,
@@ -185,7 +190,8 @@ rules::settings! {
     /// Outliers in a row after which the filter restarts at the measurement: then the filter is wrong.
     /// Tuned: by hand; no record of what on.
     restart_after_outliers: u32 = 2,
-    /// Share of the measured numbers that is fitted, from which on it is taken to take up a part of the scatter.
+    /// Share of the measured numbers that is fitted, from which on it is taken to take up a part of the
+    /// scatter.
     /// Budgeted: of ten numbers a parameter the noise is known to a quarter, and a twentieth is left out.
     min_restricted_share: f64 = 0.1,
     // Whiteness; thinning has a file of its own.
@@ -202,11 +208,12 @@ rules::settings! {
     /// Relative. A model no farther from nominal along an unobservable direction is at nominal there.
     /// Derived: a hundredth of a thousandth of what a direction is unobservable by.
     max_nominal_deviation: f64 = 3e-7,
-    /// How many runs the inverse information counts as beside those that show the scatter, beyond the parameters.
-    /// Tuned: 1 and 3 on logs that share no code with the simulator (tests/diagnosis, seeds 720 to 743) and on
-    /// `scenarios/ci.toml`. With 1 lengths of 7, 10 and 21 runs are off by 0.9 to 1.2 standard deviations, root
-    /// mean square (0.9 to 1.2 with 3), and the 95 % interval of the wheel separation of ten runs covers it in 84
-    /// % (78 % with 3, 70 % by the information alone).
+    /// How many runs the inverse information counts as beside those that show the scatter, beyond the
+    /// parameters.
+    /// Tuned: 1 and 3 on logs that share no code with the simulator (tests/diagnosis, seeds 720 to 743) and
+    /// on `scenarios/ci.toml`. With 1 lengths of 7, 10 and 21 runs are off by 0.9 to 1.2 standard deviations,
+    /// root mean square (0.9 to 1.2 with 3), and the 95 % interval of the wheel separation of ten runs covers
+    /// it in 84 % (78 % with 3, 70 % by the information alone).
     information_weight_runs: f64 = 1.0,
     // Gauss–Newton and Fisher scoring.
     /// Median of χ² with one degree of freedom: scales the noise to the median of the squared innovations.
@@ -228,7 +235,8 @@ rules::settings! {
     /// Tuned: by hand; no record of what on.
     max_fit_steps: usize = 60,
     /// Steps after the smallest one at which a fit that is compared ends as it is.
-    /// Tuned: of 3717 fits of the blind benchmark 28 would have converged later; an eighth of all steps is saved.
+    /// Tuned: of 3717 fits of the blind benchmark 28 would have converged later; an eighth of all steps is
+    /// saved.
     max_steps_without_progress: usize = 20,
     /// Fewest steps without the outlier gate, by which the noise is scaled before outliers are rejected.
     /// Tuned: by hand; no record of what on.
@@ -254,7 +262,8 @@ rules::settings! {
     /// Factor of a variance's step after it kept its sign, up to the whole step.
     /// Tuned: by hand; no record of what on.
     step_increase: f64 = 1.3,
-    /// Squared step of the mean over its variance beyond which a fit has left its basin: ten standard deviations.
+    /// Squared step of the mean over its variance beyond which a fit has left its basin: ten standard
+    /// deviations.
     /// Tuned: by hand; no record of what on.
     left_basin_step: f64 = 100.0,
     /// Damping of a Gauss–Newton step, as a share of each direction's information.
@@ -309,7 +318,8 @@ rules::settings! {
     /// Factor by which decimation must reduce the intervals to be worth it.
     /// Tuned: by hand; no record of what on.
     min_decimation: usize = 2,
-    /// Noncentrality Σδ², for innovations moved by δ standard deviations, below which decimated records serve.
+    /// Noncentrality Σδ², for innovations moved by δ standard deviations, below which decimated records
+    /// serve.
     /// Budgeted: less than one measurement varies by chance.
     max_decimation_noncentrality: f64 = 1.0,
     // Profile likelihood.
@@ -353,17 +363,19 @@ rules::settings! {
     /// Most threads over the parts.
     /// Budgeted: each holds the memory of a part.
     max_part_threads: usize = 4,
-    /// Squared step of a relative length or a heading over its standard deviation, at which one step is enough.
+    /// Squared step of a relative length or a heading over its standard deviation, at which one step is
+    /// enough.
     /// Budgeted: the step errs by its square, a twentieth of a standard deviation.
     one_step_tolerance: f64 = 0.05,
     /// Most scoring steps over everything.
     /// Tuned: by hand; no record of what on.
     max_scoring_steps: usize = 5,
-    /// Length of the part of a unit direction that must lie in the unobservable space for the space to be named
-    /// after it.
+    /// Length of the part of a unit direction that must lie in the unobservable space for the space to be
+    /// named after it.
     /// Convention: within 8° of the space.
     min_named_direction: f64 = 0.99,
-    /// Length of what must be left of a unit direction beside those that the unobservable space is named after.
+    /// Length of what must be left of a unit direction beside those that the unobservable space is named
+    /// after.
     /// Convention: more than 18° off them.
     min_own_direction: f64 = 0.3,
 }

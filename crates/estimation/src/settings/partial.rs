@@ -12,15 +12,16 @@ pub(crate) const START_HEADING_SIGMA_RAD: f64 = 1.0;
 
 rules::settings! {
     Partial
-    /// Longest stretch over which a gyroscope's rates are summed into one turn, seconds. Its noise is white, so
-    /// that the sum loses nothing but changes of speed within it.
+    /// Longest stretch over which a gyroscope's rates are summed into one turn, seconds. Its noise is white,
+    /// so that the sum loses nothing but changes of speed within it.
     /// Budgeted: shorter than a robot's motions, which last for seconds.
     gyro_window_s: f64 = 1.0,
     /// Standard deviation of a gyroscope's bias at the start of a run, rad/s.
-    /// Budgeted: beyond what any robot turns at, so that the bias counts as unknown however many runs there are.
+    /// Budgeted: beyond what any robot turns at, so that the bias counts as unknown however many runs there
+    /// are.
     gyro_bias_sigma_radps: f64 = 10.0,
-    /// Standard deviation of a gyroscope's relative scale of which nothing is stated: one that turns the other
-    /// way is a fault of wheels or mounting, and none of scale.
+    /// Standard deviation of a gyroscope's relative scale of which nothing is stated: one that turns the
+    /// other way is a fault of wheels or mounting, and none of scale.
     /// Budgeted: twice the tenth that data sheets allow consumer sensors, and far too loose to determine a
     /// wheelbase.
     gyro_scale_sigma: f64 = 0.2,

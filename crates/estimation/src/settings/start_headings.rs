@@ -22,10 +22,10 @@ rules::settings! {
     /// Longest way of such a window, in wheel separations.
     /// Derived: wheels that are off by 1 % against each other bend it by 0.2 rad, which is linear yet.
     max_window_separations: f64 = 20.0,
-    /// Gain in squared standard deviations of a position from which on the instrument stands elsewhere than at
-    /// the centre before the first fit.
-    /// Derived: 10 standard errors; below it a spin's heading hardly depends on the position, which stays at the
-    /// centre.
+    /// Gain in squared standard deviations of a position from which on the instrument stands elsewhere than
+    /// at the centre before the first fit.
+    /// Derived: 10 standard errors; below it a spin's heading hardly depends on the position, which stays at
+    /// the centre.
     min_sensor_position_chi_square: f64 = 100.0,
     /// Directions from the centre at which the search for the instrument's position starts.
     /// Derived: one is within half of an eighth of a turn.
