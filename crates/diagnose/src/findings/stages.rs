@@ -64,8 +64,7 @@ impl StageResults<'_, '_> {
     /// Lost counts or stamps were restored roughly: they explain outliers and autocorrelated errors that are
     /// left.
     fn restored(&self) -> bool {
-        self.faults.iter().any(|fault| fault.is_restored_roughly())
-            || self.stamps.is_some_and(|stamps| stamps.is_undone_roughly)
+        self.faults.iter().any(Fault::is_restored_roughly) || self.stamps.is_some_and(|stamps| stamps.is_undone_roughly)
     }
 }
 

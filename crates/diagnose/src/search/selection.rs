@@ -1,5 +1,6 @@
 //! Forward selection over the catalogue with refits, and the causes that the data do not discriminate.
 
+use estimation::ModelFit;
 use rules::Rule;
 
 use crate::candidates::candidate::{Candidate, terms};
@@ -224,6 +225,26 @@ fn scale_differences_of_delays(causes: &mut [(Name, AugmentedModel<'_>)]) {
     }
 }
 
+/// The standard deviation that uncertain variants and causes add to each size of each candidate; `beside` has
+/// the variances over the causes of the others. Variants are fitted.
+fn extra_sigma<'a>(
+    base: &ModelFit<'a>,
+    model: &mut AugmentedModel<'a>,
+    beside: Vec<(Candidate, Vec<f64>)>,
+) -> Vec<Vec<f64>> {
+    let candidates = model.candidates.clone();
+    let mut extra_sigma: Vec<Vec<f64>> = (0..candidates.len()).map(|index| fit_variant(base, model, index)).collect();
+    for (candidate, variances) in beside {
+        if let Some(index) = candidates.iter().position(|own| *own == candidate) {
+            extra_sigma[index]
+                .iter_mut()
+                .zip(variances)
+                .for_each(|(extra_sigma, variance)| *extra_sigma = extra_sigma.hypot(variance.sqrt()));
+        }
+    }
+    extra_sigma
+}
+
 /// Adds effects while the scan finds some. Then tests whether each is needed beside the others, and finds
 /// its possible causes.
 pub(crate) fn search<'a>(mut known: FitCache<'a>, catalogue: &[Candidate], level: f64) -> SearchResult<'a> {
@@ -290,17 +311,7 @@ pub(crate) fn search<'a>(mut known: FitCache<'a>, catalogue: &[Candidate], level
         model = found.swap_remove(0).1;
         index += 1;
     }
-    let candidates = model.candidates.clone();
-    let mut extra_sigma: Vec<Vec<f64>> =
-        (0..candidates.len()).map(|index| fit_variant(known.base(), &mut model, index)).collect();
-    for (candidate, variances) in beside {
-        if let Some(index) = candidates.iter().position(|own| *own == candidate) {
-            extra_sigma[index]
-                .iter_mut()
-                .zip(variances)
-                .for_each(|(extra_sigma, variance)| *extra_sigma = extra_sigma.hypot(variance.sqrt()));
-        }
-    }
+    let mut extra_sigma = extra_sigma(known.base(), &mut model, beside);
     // Candidates that stood in for a variant that is fitted now are not needed any more.
     let tests = tests_in(&first_scan);
     for index in (0..names.len()).rev() {
