@@ -12,7 +12,7 @@ use crate::terminal::Failure;
 /// What the file says.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub(crate) struct Ablation {
+struct Ablation {
     off: Vec<Rule>,
     decisions: Option<PathBuf>,
     preflight: preflight::settings::Settings,
@@ -20,21 +20,19 @@ pub(crate) struct Ablation {
     diagnose: diagnose::settings::Settings,
 }
 
-impl Ablation {
-    /// Takes the settings of a file, and switches its rules off.
-    pub(crate) fn begin(file: &Path) -> Result<Self, Failure> {
-        let unreadable = |error: toml::de::Error| format!("{}: {}", file.display(), error.message());
-        let ablation: Self = toml::from_str(&read_text(file)?).map_err(unreadable)?;
-        rules::switch_off(ablation.off.iter().copied())?;
-        preflight::settings::install(ablation.preflight.clone())?;
-        estimation::settings::install(ablation.estimation.clone())?;
-        diagnose::settings::install(ablation.diagnose.clone())?;
-        Ok(ablation)
-    }
+/// Takes the settings of a file, and switches its rules off; returns the file for the decisions.
+pub(crate) fn begin(file: &Path) -> Result<Option<PathBuf>, Failure> {
+    let unreadable = |error: toml::de::Error| format!("{}: {}", file.display(), error.message());
+    let Ablation { off, decisions, preflight, estimation, diagnose } =
+        toml::from_str(&read_text(file)?).map_err(unreadable)?;
+    rules::switch_off(off)?;
+    preflight::settings::install(preflight)?;
+    estimation::settings::install(estimation)?;
+    diagnose::settings::install(diagnose)?;
+    Ok(decisions)
+}
 
-    /// Writes how often each rule decided.
-    pub(crate) fn end(&self) -> Result<(), Failure> {
-        let Some((file, decisions)) = self.decisions.as_ref().zip(rules::decisions()) else { return Ok(()) };
-        Ok(atomic_file::write_whole(file, serde_json::to_string(&decisions)?.as_bytes())?)
-    }
+/// Writes how often each rule decided.
+pub(crate) fn end(file: &Path) -> Result<(), Failure> {
+    Ok(atomic_file::write_whole(file, serde_json::to_string(&rules::decisions())?.as_bytes())?)
 }

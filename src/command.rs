@@ -17,12 +17,11 @@ use anstream::{AutoStream, ColorChoice};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
-use crate::ablation::Ablation;
 use crate::signals::Signals;
 use crate::terminal::{Printed, Terminal, import_command};
 use crate::{
-    calibrate, challenge, check, command_line, compare, correct, demo, diagnose_command, evaluate, export_command,
-    fleet_command, help, import, manual, merge, plan, replay_case, reproduce, simulate, sweep,
+    ablation, calibrate, challenge, check, command_line, compare, correct, demo, diagnose_command, evaluate,
+    export_command, fleet_command, help, import, manual, merge, plan, replay_case, reproduce, simulate, sweep,
 };
 
 pub use crate::watch::{Progress, Watch};
@@ -165,8 +164,8 @@ fn with_format(error: clap::Error, grammar: &mut clap::Command) -> clap::Error {
 
 fn run(cli: &Cli, arguments: &[OsString], terminal: &Terminal) -> u8 {
     command_line::keep(arguments);
-    let ablation = match cli.settings.as_deref().map(Ablation::begin).transpose() {
-        Ok(ablation) => ablation,
+    let decisions = match cli.settings.as_deref().map(ablation::begin).transpose() {
+        Ok(decisions) => decisions.flatten(),
         Err(failure) => {
             terminal.failure(&failure.to_string());
             return 1;
@@ -198,7 +197,7 @@ fn run(cli: &Cli, arguments: &[OsString], terminal: &Terminal) -> u8 {
         Command::Completions(arguments) => manual::completions(arguments, grammar(), terminal),
         Command::Man(arguments) => manual::man(arguments, grammar(), terminal),
     };
-    let ended = ablation.map_or(Ok(()), |ablation| ablation.end());
+    let ended = decisions.as_deref().map_or(Ok(()), ablation::end);
     match outcome.and_then(|code| ended.map(|()| code)) {
         Ok(code) => number(code),
         Err(failure) => {

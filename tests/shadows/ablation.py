@@ -18,6 +18,8 @@ import subprocess
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+from drawn_logs import diagnose
+
 # The same logs whenever a rule is asked again.
 SEED = 66
 
@@ -30,11 +32,7 @@ def decisions(yair, log, work):
         kept.parent.mkdir(parents=True, exist_ok=True)
         settings = kept.with_suffix(".toml")
         settings.write_text(f'decisions = "{kept}.new"\n')
-        answer = json.loads((log / "answer.json").read_text())
-        sessions = sorted(str(folder) for folder in (log / "training").iterdir())
-        without = [word for effect in answer.get("without", []) for word in ("--without", effect)]
-        command = [yair, "diagnose", "--settings", str(settings), *sessions, *without, "--json", "--quiet"]
-        subprocess.run(command, capture_output=True, env={**os.environ, "RAYON_NUM_THREADS": "1"})
+        diagnose(yair, log, "--settings", str(settings))
         settings.unlink()
         written = Path(f"{kept}.new")
         written.rename(kept) if written.exists() else kept.write_text("{}")

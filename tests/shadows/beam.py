@@ -10,9 +10,7 @@ import argparse
 import gzip
 import json
 import math
-import os
 import pickle
-import subprocess
 import time
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
@@ -20,6 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from drawn_logs import answer_of, diagnose
 
 # As `diagnose` has them: cost of a rejected innovation, and units below which runs do not say how they scatter.
 OUTLIER_COST = 0.5 * 25.9 / 3.0
@@ -50,19 +49,15 @@ def dump_one(log, yair, work, number):
     kept = work / f"{log.parent.name}-{log.name}.json.gz"
     if kept.exists():
         return
-    answer = json.loads((log / "answer.json").read_text())
-    sessions = sorted(str(folder) for folder in (log / "training").iterdir())
-    without = [word for name in answer.get("without", []) for word in ("--without", name)]
     beam = work / f"beam-{number}.jsonl"
     beam.unlink(missing_ok=True)
     begun = time.time()
-    command = [yair, "diagnose", *sessions, *without, "--json", "--quiet", "--beam", str(beam)]
-    ran = subprocess.run(command, capture_output=True, env={**os.environ, "RAYON_NUM_THREADS": "1"})
+    ran = diagnose(yair, log, "--beam", str(beam))
     document = json.loads(ran.stdout) if ran.returncode in (0, 3) and ran.stdout else None
     short = document and {key: document[key] for key in ("findings", "candidates")}
     models = [json.loads(line) for line in beam.read_text().splitlines()] if beam.exists() else []
     with gzip.open(kept, "wt", compresslevel=5) as file:
-        json.dump({"answer": answer, "document": short, "models": models, "seconds": time.time() - begun}, file)
+        json.dump({"answer": answer_of(log), "document": short, "models": models, "seconds": time.time() - begun}, file)
 
 
 @dataclass

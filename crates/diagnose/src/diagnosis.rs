@@ -10,7 +10,9 @@ use crate::findings::extrinsics;
 use crate::options::Options;
 use crate::records::log::Log;
 use crate::records::prepared::Prepared;
-use crate::records::record_faults::{determines_wheels, faults, is_correlated, rejected_share, sessions};
+use crate::records::record_faults::{
+    Fault, determines_wheels, fault, is_correlated, rejected_share, second_fault, sessions,
+};
 use crate::records::stamp_errors::{StampError, stamp_error, with_rows_of};
 use crate::records::unknown_motion::AnomalyKind;
 use crate::report::{AsStamped, Diagnosis, EVERY_MEASUREMENT, Explained};
@@ -59,8 +61,8 @@ pub enum DiagnoseError {
     NoFit(#[from] EstimationError),
 }
 
-/// Diagnoses a log: one robot's sessions, or stretches of a large log, of which all rows are said too. The
-/// stages in order, each a function of the results before it.
+/// Diagnoses a log: the sessions of one robot, or the stretches of a large log and the tests of all its rows.
+/// The stages run in order, each a function of the results before it.
 ///
 /// # Errors
 /// [`DiagnoseError`] when an id is unknown or no base model can be fitted.
@@ -72,21 +74,26 @@ pub fn diagnose<'l>(log: impl Into<Log<'l>>, options: &Options) -> Result<Diagno
     let every_term = mean_terms(&options.without);
     let prepared = Prepared::of(log, &every_term, RECORDS.min_common_clock_offset_s);
     begins(Step::RecordFaults);
-    let as_recorded = EVERY_MEASUREMENT.fit(&sessions(prepared.records()));
-    let faults = faults(prepared.records(), as_recorded.as_ref().ok(), &options.without)?;
+    let fit = |records| EVERY_MEASUREMENT.fit(&sessions(records));
+    let as_recorded = fit(prepared.records());
+    let first = Rule::RecordFault.finds(fault(prepared.records(), as_recorded.as_ref().ok(), &options.without));
     // To an instrument that is precise, a clock that is off by less makes most measurements outliers.
-    let retries = faults.is_empty()
-        && Rule::ClockRetry.applies(as_recorded.as_ref().is_ok_and(has_most_rejected))
-        && !prepared.has_clock();
-    let again = retries.then(|| Prepared::of(log, &every_term, RECORDS.min_rejecting_clock_offset_s));
+    let asks_again = first.is_none() && !prepared.has_clock() && as_recorded.as_ref().is_ok_and(has_most_rejected);
+    let again = Rule::ClockRetry
+        .applies(asks_again)
+        .then(|| Prepared::of(log, &every_term, RECORDS.min_rejecting_clock_offset_s));
     let (prepared, as_recorded) = match &again {
-        Some(again) => (again, EVERY_MEASUREMENT.fit(&sessions(again.records()))),
+        Some(again) => (again, fit(again.records())),
         None => (&prepared, as_recorded),
     };
-    let (records, base) = match faults.last() {
-        None => (prepared.records(), as_recorded?),
-        Some(fault) => (&fault.records[..], EVERY_MEASUREMENT.fit(&sessions(&fault.records))?),
+    let base = match &first {
+        None => as_recorded?,
+        Some(fault) => fit(&fault.records)?,
     };
+    let second = first.as_ref().and_then(|first| second_fault(first, &base, &options.without));
+    let faults: Vec<&Fault> = first.iter().chain(&second).collect();
+    let records = faults.last().map_or(prepared.records(), |fault| &fault.records);
+    let base = if second.is_some() { fit(records)? } else { base };
     begins(Step::MeanStructure);
     let base = correlated_base(records, base);
     // Stamps that are wrong: everything that comes from them is sought in records that are restamped.
@@ -127,7 +134,7 @@ pub fn diagnose<'l>(log: impl Into<Log<'l>>, options: &Options) -> Result<Diagno
     Ok(found)
 }
 
-/// An id that is none, and more runs than a diagnosis is of.
+/// Refuses unknown effects, and logs with more runs than a diagnosis can take.
 fn refuse(log: Log<'_>, options: &Options) -> Result<(), DiagnoseError> {
     if let Some(id) = options.without.iter().find(|id| !CATALOGUE.contains(&id.as_str())) {
         return Err(DiagnoseError::UnknownEffect { id: id.clone() });

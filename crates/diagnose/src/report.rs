@@ -107,7 +107,7 @@ impl<'a> AsStamped<'a> {
 pub(crate) struct Explained<'s, 'a> {
     pub(crate) log: Log<'s>,
     pub(crate) prepared: &'s Prepared<'s>,
-    pub(crate) faults: &'s [Fault],
+    pub(crate) faults: &'s [&'s Fault],
     pub(crate) stamps: Option<&'s StampError>,
     pub(crate) as_stamped: Option<AsStamped<'a>>,
     /// As effects were sought in them.

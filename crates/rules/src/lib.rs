@@ -203,19 +203,6 @@ rules! {
 }
 
 impl Rule {
-    /// Its name in files and documents.
-    #[must_use]
-    pub fn name(self) -> String {
-        let mut name = String::new();
-        for letter in format!("{self:?}").chars() {
-            if letter.is_uppercase() && !name.is_empty() {
-                name.push('_');
-            }
-            name.extend(letter.to_lowercase());
-        }
-        name
-    }
-
     /// Whether the rule decides: its condition, unless it is off.
     #[inline]
     #[must_use]
@@ -232,10 +219,14 @@ impl Rule {
         found.filter(|_| self.applies(true))
     }
 
-    /// The change that the rule makes, or what was there before where it is off.
+    /// What a change makes of a value, or the value as it was where the rule is off.
     #[must_use]
-    pub fn changes<T: PartialEq>(self, before: T, after: T) -> T {
-        if self.applies(before != after) || before == after { after } else { before }
+    pub fn changes<T: Clone + PartialEq>(self, before: T, change: impl FnOnce(T) -> T) -> T {
+        if ABLATION.get().is_none() {
+            return change(before);
+        }
+        let after = change(before.clone());
+        if self.applies(before != after) { after } else { before }
     }
 
     /// Whether the rule is on at all: for what is costly to find.
@@ -276,10 +267,9 @@ pub fn switch_off(rules: impl IntoIterator<Item = Rule>) -> Result<(), SwitchedB
 
 /// How often each rule decided, or would have where it is off; `None` where nothing is counted.
 #[must_use]
-pub fn decisions() -> Option<BTreeMap<String, u64>> {
-    let ablation = ABLATION.get()?;
-    let counts = Rule::ALL.iter().zip(&ablation.decided);
-    Some(counts.map(|(rule, count)| (rule.name(), count.load(Ordering::Relaxed))).filter(|of| of.1 > 0).collect())
+pub fn decisions() -> Option<BTreeMap<Rule, u64>> {
+    let counts = Rule::ALL.iter().copied().zip(&ABLATION.get()?.decided);
+    Some(counts.map(|(rule, count)| (rule, count.load(Ordering::Relaxed))).filter(|of| of.1 > 0).collect())
 }
 
 /// Settings of one subject: fields with a default each. They are data, which an ablation may vary.
@@ -344,9 +334,12 @@ mod tests {
         switch_off([Rule::Outdone]).expect("the first time");
         assert!(!Rule::Outdone.applies(true) && !Rule::Outdone.applies(false) && Rule::Packets.applies(true));
         assert_eq!((Rule::Outdone.finds(Some(1)), Rule::Packets.finds(Some(1))), (None, Some(1)));
-        assert_eq!((Rule::Outdone.changes(1, 2), Rule::Packets.changes(1, 2), Rule::Packets.changes(3, 3)), (1, 2, 3));
-        let expected = [("outdone".to_owned(), 3), ("packets".to_owned(), 3)];
-        assert_eq!(decisions(), Some(BTreeMap::from(expected)));
+        let changed = |rule: Rule, before, after| rule.changes(before, |_| after);
+        assert_eq!(
+            (changed(Rule::Outdone, 1, 2), changed(Rule::Packets, 1, 2), changed(Rule::Packets, 3, 3)),
+            (1, 2, 3)
+        );
+        assert_eq!(decisions(), Some(BTreeMap::from([(Rule::Outdone, 3), (Rule::Packets, 3)])));
         assert_eq!(switch_off([]), Err(SwitchedBefore));
         assert_eq!(Rule::ALL[Rule::Packets as usize], Rule::Packets);
     }

@@ -42,7 +42,8 @@ impl LastingErrors {
     /// An instrument errs while the robot stands, too, unless its errors go with the place.
     fn of(structure: &MeanStructure<'_>, recorded: &[Dataset]) -> Option<Self> {
         let (coefficient, sigmas) = structure.correlated.filter(|(coefficient, _)| *coefficient > 0.0)?;
-        let at_rest = Rule::ErrorsAtRest.changes(ErrorsAtRest::Autocorrelated, errors_at_rest(recorded, coefficient));
+        let at_rest =
+            Rule::ErrorsAtRest.changes(ErrorsAtRest::Autocorrelated, |_| errors_at_rest(recorded, coefficient));
         Some(Self { coefficient, sigmas, at_rest })
     }
 

@@ -44,7 +44,7 @@ pub(crate) struct StageResults<'e, 'a> {
     /// The tests of the log itself: its rows, and its time span.
     pub(crate) log: Option<&'e TestResult>,
     pub(crate) spans: Option<&'e TestResult>,
-    pub(crate) faults: &'e [Fault],
+    pub(crate) faults: &'e [&'e Fault],
     pub(crate) clocks: &'e [ClockOffset],
     /// A drift of all clocks that was set right before the fit.
     pub(crate) drift: Option<&'e ClockDrift>,
@@ -64,7 +64,8 @@ impl StageResults<'_, '_> {
     /// Lost counts or stamps were restored roughly: they explain outliers and autocorrelated errors that are
     /// left.
     fn restored(&self) -> bool {
-        self.faults.iter().any(Fault::is_restored_roughly) || self.stamps.is_some_and(|stamps| stamps.is_undone_roughly)
+        self.faults.iter().any(|fault| fault.is_restored_roughly())
+            || self.stamps.is_some_and(|stamps| stamps.is_undone_roughly)
     }
 }
 
@@ -73,40 +74,42 @@ type Stage = fn(&StageResults<'_, '_>, Vec<Finding>) -> Vec<Finding>;
 
 /// The findings, record faults first, then by significance.
 pub(crate) fn findings(results: &StageResults<'_, '_>) -> Vec<Finding> {
-    let stages: [Stage; 19] = [
-        record_faults,
-        extrinsics,
-        mean_effects,
-        clocks,
-        stamps,
-        mean_lateness,
-        anomalies,
-        sparse_terms,
-        noise_effects,
-        faults_of_the_log,
-        failed_checks,
-        doubt_parts_of_stronger_findings,
-        doubt_incomplete_models,
-        without_what_doubts_say,
-        doubt_low_significance,
-        doubt_what_does_not_carry_over,
-        without_errors_of_the_map,
-        without_remainders_of_stamps,
-        by_significance,
+    let stages: [(Option<Rule>, Stage); 19] = [
+        (None, record_faults),
+        (Some(Rule::ExtrinsicsFound), extrinsics),
+        (None, mean_effects),
+        (None, clocks),
+        (None, stamps),
+        (Some(Rule::MeanLateness), mean_lateness),
+        (None, anomalies),
+        (None, sparse_terms),
+        (None, noise_effects),
+        (None, faults_of_the_log),
+        (Some(Rule::FailedChecks), failed_checks),
+        (Some(Rule::PartOfStronger), doubt_parts_of_stronger_findings),
+        (None, doubt_incomplete_models),
+        (Some(Rule::WithoutWhatDoubtsSay), without_what_doubts_say),
+        (Some(Rule::LowSignificance), doubt_low_significance),
+        (None, doubt_what_does_not_carry_over),
+        (Some(Rule::SystematicErrors), without_errors_of_the_map),
+        (Some(Rule::RemaindersOfStamps), without_remainders_of_stamps),
+        (None, by_significance),
     ];
-    stages.iter().fold(Vec::new(), |findings, stage| stage(results, findings))
+    stages.into_iter().fold(Vec::new(), |findings, (rule, stage)| match rule {
+        Some(rule) => rule.changes(findings, |findings| stage(results, findings)),
+        None => stage(results, findings),
+    })
 }
 
 fn record_faults(results: &StageResults<'_, '_>, _: Vec<Finding>) -> Vec<Finding> {
-    results.faults.iter().map(finding::of_fault).collect()
+    results.faults.iter().map(|fault| finding::of_fault(fault)).collect()
 }
 
 /// Extrinsics that were fitted before effects were sought.
 fn extrinsics(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
     // Extrinsics of a motion that is not the robot's are none.
     if !results.uncorrelated {
-        let found = extrinsics::of_model(results.structure.model(), results.without);
-        findings.extend(found.into_iter().filter(|_| Rule::ExtrinsicsFound.applies(true)));
+        findings.extend(extrinsics::of_model(results.structure.model(), results.without));
     }
     findings
 }
@@ -148,9 +151,7 @@ fn stamps(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Fin
 
 /// What all stamps are late by, which the instrument's clock shows.
 fn mean_lateness(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
-    let before = findings.clone();
     join_clock(&mut findings, results.stamps, results.recorded);
-    findings = Rule::MeanLateness.changes(before, findings);
     findings
 }
 
@@ -235,17 +236,15 @@ fn failed_checks(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> 
     if !(results.restored() || scatters || is_reported) {
         let refusals = structure.found.refusals.iter();
         let refused = refusals.filter(|(_, refusal)| refusal.is_for_other_runs()).map(|(id, _)| *id);
-        let failed = finding::of_failed_checks(&structure.checked, results.without, refused);
-        findings.extend(Rule::FailedChecks.finds(failed));
+        findings.extend(finding::of_failed_checks(&structure.checked, results.without, refused));
     }
     findings
 }
 
 fn doubt_parts_of_stronger_findings(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
     let full = results.structure.found.model.candidates.len() >= LEVELS.max_effects;
-    let before = findings.clone();
     finding::doubt(&mut findings[results.faults.len()..], full);
-    Rule::PartOfStronger.changes(before, findings)
+    findings
 }
 
 /// Effects whose data have another form than they have, and an uncatalogued term that is significant beside
@@ -261,15 +260,17 @@ fn doubt_incomplete_models(results: &StageResults<'_, '_>, mut findings: Vec<Fin
     for (index, deviation) in left.of_forms {
         let has_exact_form = model.candidates[index].has_exact_form();
         if let Some(finding) = findings.iter_mut().find(|finding| finding.term == Some(index)) {
-            let mut doubted = finding.clone();
-            finding::or_of_other_form(&mut doubted, deviation, has_exact_form);
-            *finding = Rule::OtherForm.changes(finding.clone(), doubted);
+            *finding = Rule::OtherForm.changes(finding.clone(), |mut finding| {
+                finding::or_of_other_form(&mut finding, deviation, has_exact_form);
+                finding
+            });
         }
     }
     if let Some(product) = left.of_products {
-        let before = findings.clone();
-        finding::or_incomplete(&mut findings, product);
-        findings = Rule::Incomplete.changes(before, findings);
+        findings = Rule::Incomplete.changes(findings, |mut findings| {
+            finding::or_incomplete(&mut findings, product);
+            findings
+        });
     }
     findings
 }
@@ -280,17 +281,13 @@ fn without_what_doubts_say(_: &StageResults<'_, '_>, mut findings: Vec<Finding>)
     let is_incomplete = |doubt: &Doubt| matches!(doubt, Doubt::Incomplete | Doubt::OtherForm(_));
     let incomplete = findings.iter().filter(|finding| finding.doubts.iter().any(is_incomplete));
     let plainest = incomplete.map(|finding| finding.z).fold(0.0, f64::max);
-    findings.retain(|finding| {
-        let is_less_plain = matches!(finding.basis, Basis::FailedTests(_)) && finding.z < plainest;
-        !Rule::WithoutWhatDoubtsSay.applies(is_less_plain)
-    });
+    findings.retain(|finding| !matches!(finding.basis, Basis::FailedTests(_)) || finding.z >= plainest);
     findings
 }
 
 fn doubt_low_significance(_: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
-    let before = findings.clone();
     finding::or_of_low_significance(&mut findings);
-    Rule::LowSignificance.changes(before, findings)
+    findings
 }
 
 /// A term that some session or kind of path does not have as the others give it shares its place: what else
@@ -308,9 +305,8 @@ fn doubt_what_does_not_carry_over(results: &StageResults<'_, '_>, mut findings: 
 
 /// What the instrument's map explains by its errors, which return with the place.
 fn without_errors_of_the_map(results: &StageResults<'_, '_>, mut findings: Vec<Finding>) -> Vec<Finding> {
-    let before = findings.clone();
     without_systematic_errors(&mut findings, &results.structure.base, results.structure.model());
-    Rule::SystematicErrors.changes(before, findings)
+    findings
 }
 
 /// Stamps that were set right only roughly, or that a term explains which does not know of which tick all
@@ -326,10 +322,7 @@ fn without_remainders_of_stamps(results: &StageResults<'_, '_>, mut findings: Ve
         None => findings.iter().any(is_of_late_stamps) && have_uncertain_rows(results.recorded),
     };
     if are_rough {
-        findings.retain(|finding| {
-            let is_remainder = !finding.is_of_stamps() && finding.has_unlisted();
-            !Rule::RemaindersOfStamps.applies(is_remainder)
-        });
+        findings.retain(|finding| finding.is_of_stamps() || !finding.has_unlisted());
     }
     findings
 }

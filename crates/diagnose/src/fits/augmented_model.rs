@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use estimation::{Column, ModelFit, NormalEquations, total};
 use nalgebra::DVector;
+use rayon::prelude::*;
 
 use crate::candidates::candidate::{Candidate, terms};
 use crate::settings::SEARCH;
@@ -86,6 +87,16 @@ pub(crate) fn refit<'a>(
     let most = [&from_here, &from_base].into_iter().flatten().map(count).fold(0.0, f64::max);
     let fit = from_here.into_iter().chain(from_base).min_by(|a, b| cost(a, most).total_cmp(&cost(b, most)))?;
     Some(AugmentedModel { fit, candidates })
+}
+
+/// The models that `refit` makes for each of some candidates, in their order. While a fit goes on it holds
+/// the propagations of all runs, and its passes take all cores by themselves: only a few go on at a time.
+pub(crate) fn refit_each<'a, T: Sync>(
+    of: &[T],
+    refit: impl Fn(&T) -> Option<AugmentedModel<'a>> + Sync,
+) -> Vec<AugmentedModel<'a>> {
+    let few = |few: &[T]| few.par_iter().filter_map(&refit).collect::<Vec<_>>();
+    of.chunks(SEARCH.max_fits_at_a_time).flat_map(few).collect()
 }
 
 /// A model's candidates but one.

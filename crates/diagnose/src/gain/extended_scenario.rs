@@ -26,7 +26,7 @@ const STAND_IN: &str = include_str!("default_actuators.toml");
 pub(crate) fn scenario_of(
     datasets: &[Dataset],
     nominal: &NominalRobot,
-    faults: &[Fault],
+    faults: &[&Fault],
     stamps: Option<&StampError>,
     model: &AugmentedModel<'_>,
 ) -> Result<Scenario, String> {

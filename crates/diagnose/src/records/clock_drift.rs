@@ -1,11 +1,11 @@
 //! Clocks of instrument and robot that drift so far apart that one offset does not hold.
 //!
 //! Each short run, and each part of a long one, has a profile likelihood of its offset
-//! ([`crate::clock_profile`]). Where the offset is proportional to the time since each run's start, or since
-//! the session's, a line goes through these offsets. A part that lies off the line costs no more than a cap:
-//! its offset may be beyond the range of the profiles. The line is taken off the measurements' times, and the
-//! next one is fitted to what is left, until nothing is left. What the model fit finds of the rate later is
-//! added. Reference: Fischler & Bolles 1981 (RANSAC: lines through pairs, judged by all parts).
+//! ([`crate::records::clock_profile`]). Where the offset is proportional to the time since each run's start,
+//! or since the session's, a line goes through these offsets. A part that lies off the line costs no more
+//! than a cap: its offset may be beyond the range of the profiles. The line is taken off the measurements'
+//! times, and the next one is fitted to what is left, until nothing is left. What the model fit finds of the
+//! rate later is added. Reference: Fischler & Bolles 1981 (RANSAC: lines through pairs, judged by all parts).
 
 use dataset::Dataset;
 

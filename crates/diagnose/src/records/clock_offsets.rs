@@ -1,8 +1,8 @@
 //! Clocks of instrument and robot that are far apart: of all runs, or of one among many.
 //!
-//! Before anything is fitted, each run has a profile likelihood of its offset ([`crate::clock_profile`]). An
-//! offset of all runs is taken off before the fit. A run with an offset of its own is left out: it would be
-//! explained by whatever term it pays best.
+//! Before anything is fitted, each run has a profile likelihood of its offset
+//! ([`crate::records::clock_profile`]). An offset of all runs is taken off before the fit. A run with an
+//! offset of its own is left out: it would be explained by whatever term it pays best.
 
 use dataset::Dataset;
 use rules::Rule;

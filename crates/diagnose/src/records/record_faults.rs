@@ -6,7 +6,7 @@
 
 use dataset::{Dataset, Session};
 use effects::{CATALOGUE, Hypothesis, RecordCorrection, hypothesis};
-use estimation::{Column, EstimationError, FitSettings, ModelFit, NoiseComponent};
+use estimation::{Column, FitSettings, ModelFit, NoiseComponent};
 use rayon::prelude::*;
 use rules::Rule;
 
@@ -41,27 +41,8 @@ pub(crate) fn sessions(datasets: &[Dataset]) -> Vec<Session<'_>> {
     datasets.iter().map(Dataset::session).collect()
 }
 
-/// The faults of some records, of which `base` is the fit: one may mask another, so that a second is sought
-/// after the first.
-///
-/// # Errors
-/// [`EstimationError`] where records without a fault have no fit.
-pub(crate) fn faults(
-    records: &[Dataset],
-    base: Option<&ModelFit<'_>>,
-    without: &[String],
-) -> Result<Vec<Fault>, EstimationError> {
-    let Some(first) = Rule::RecordFault.finds(fault(records, base, without)) else { return Ok(Vec::new()) };
-    let second = {
-        let base = PLAIN.fit(&sessions(&first.records))?;
-        let without = [without, &[first.id.to_owned()]].concat();
-        Rule::SecondRecordFault.finds(fault(&first.records, Some(&base), &without))
-    };
-    Ok([Some(first), second].into_iter().flatten().collect())
-}
-
 /// The fault that the log itself shows, or else that makes the data far likelier, if there is one.
-fn fault(datasets: &[Dataset], base: Option<&ModelFit<'_>>, without: &[String]) -> Option<Fault> {
+pub(crate) fn fault(datasets: &[Dataset], base: Option<&ModelFit<'_>>, without: &[String]) -> Option<Fault> {
     let sound = base.is_some_and(is_sound);
     // The most specific trace first: jumps that are undone at once are also wraps.
     let sought: Vec<&'static str> = CATALOGUE
@@ -90,6 +71,12 @@ fn fault(datasets: &[Dataset], base: Option<&ModelFit<'_>>, without: &[String]) 
         }
     }
     best.map(|(visible, fault)| Fault { rivals: rivals(&tried, visible, &fault), ..fault })
+}
+
+/// A second fault in records without the first one, to which `base` is fitted: one may mask the other.
+pub(crate) fn second_fault(first: &Fault, base: &ModelFit<'_>, without: &[String]) -> Option<Fault> {
+    let without = [without, &[first.id.to_owned()]].concat();
+    Rule::SecondRecordFault.finds(fault(&first.records, Some(base), &without))
 }
 
 /// The forms of a fault that explain the records, each with whether the log shows it by itself.

@@ -3,9 +3,10 @@
 //!
 //! A robot that is pushed, a wheel that is lifted, a loop closure of the instrument's map, a marker that
 //! slips: one such event in a run is explained by whatever term it pays best, and that term is then found.
-//! Before any fit, windows between measured poses show them ([`crate::pose_windows`]): far beyond the noise
-//! of windows as long, beyond what wheels that roll can miss, and not undone by the next measurements.
-//! Nothing is compared across such a window afterwards, and a run of another mounting is left out.
+//! Before any fit, windows between measured poses show them ([`crate::records::pose_windows`]): far beyond
+//! the noise of windows as long, beyond what wheels that roll can miss, and not undone by the next
+//! measurements. Nothing is compared across such a window afterwards, and a run of another mounting is left
+//! out.
 
 mod events;
 mod other_extrinsics;

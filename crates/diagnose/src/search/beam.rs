@@ -10,7 +10,7 @@ use serde::Serialize;
 use crate::candidates::candidate::{Candidate, terms};
 use crate::candidates::physical::{is_physical, is_plausible};
 use crate::findings::geometry_deviations::keeps_wheels;
-use crate::fits::augmented_model::{AugmentedModel, refit};
+use crate::fits::augmented_model::{AugmentedModel, refit, refit_each};
 use crate::fits::cancellation::effects_cancel;
 use crate::fits::fit_cache::FitCache;
 use crate::fits::model_comparison::log_bayes_factor;
@@ -138,13 +138,13 @@ pub(crate) fn beam(structure: &MeanStructure<'_>, catalogue: &[Candidate]) -> Ve
             entries.retain(|entry| entry.scored.dimensions > 0);
             entries.sort_by(|a, b| b.scored.log_odds.total_cmp(&a.scored.log_odds));
             let added: Vec<Candidate> = entries.iter().take(most).flat_map(variants).collect();
-            let with = |added: &&Candidate| {
-                let candidates = [&model.candidates[..], from_ref(*added)].concat();
+            let with = |added: &Candidate| {
+                let candidates = [&model.candidates[..], from_ref(added)].concat();
                 let of_both = |next: &&AugmentedModel<'_>| candidates.iter().all(|own| next.candidates.contains(own));
                 next.iter().find(of_both).is_none().then_some(())?;
                 known.fit(&candidates).cloned().or_else(|| refit(base, model, candidates))
             };
-            let fits: Vec<_> = added.iter().filter_map(|added| with(&added)).collect();
+            let fits = refit_each(&added, with);
             next.extend(fits);
             if model.candidates.is_empty() {
                 alone = added;

@@ -3,14 +3,13 @@
 use std::collections::BTreeMap;
 
 use nalgebra::DVector;
-use rayon::prelude::*;
 use rules::Rule;
 use serde::Serialize;
 
 use crate::candidates::candidate::Candidate;
 use crate::candidates::physical::{is_physical, is_plausible};
 use crate::findings::geometry_deviations::keeps_wheels;
-use crate::fits::augmented_model::{AugmentedModel, cost, count, refit};
+use crate::fits::augmented_model::{AugmentedModel, cost, count, refit, refit_each};
 use crate::fits::fit_cache::FitCache;
 use crate::fits::model_comparison::{log_odds_margin, occam_factor, relative_odds};
 use crate::fits::wald::wald_test;
@@ -81,17 +80,14 @@ pub(crate) fn rivals<'a>(
     let close = close_statistic(best);
     let mut contenders = contenders(entries, best);
     let best_variants: Vec<Candidate> = contenders.iter().map(|entry| entry.scored.candidate.clone()).collect();
-    // Models that each have one of these candidates more, without those that diverge. While a fit goes on it
-    // holds the propagations of all runs, and its passes take all cores by themselves: only a few go on at a
-    // time.
+    // Models that each have one of these candidates more, without those that diverge.
     let mut fit_each = |added: &[Candidate]| {
         let with = |candidate: &Candidate| {
             let mut candidates = without.candidates.clone();
             candidates.insert(index, candidate.clone());
             known.fit(&candidates).cloned().or_else(|| refit(known.base(), without, candidates))
         };
-        let few = |few: &[Candidate]| few.par_iter().filter_map(with).collect::<Vec<_>>();
-        let models: Vec<_> = added.chunks(SEARCH.max_fits_at_a_time).flat_map(few).collect();
+        let models = refit_each(added, with);
         models.iter().for_each(|model| known.keep(model));
         models
     };

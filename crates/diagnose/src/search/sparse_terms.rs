@@ -3,12 +3,11 @@
 use effects::{Channel, Covariate, Sparse};
 use estimation::ModelFit;
 use kinematics::Side;
-use rayon::prelude::*;
 
 use crate::candidates::candidate::Candidate;
 use crate::candidates::covariates::{of_cycles, of_runs};
 use crate::findings::geometry_deviations::keeps_wheels;
-use crate::fits::augmented_model::{AugmentedModel, refit};
+use crate::fits::augmented_model::{AugmentedModel, refit, refit_each};
 use crate::fits::cancellation::effects_cancel;
 use crate::fits::model_comparison::{form_error_statistic, log_bayes_factor};
 use crate::fits::null_distribution::NullDistribution;
@@ -189,13 +188,7 @@ impl<'m, 'a> SparseSearch<'m, 'a> {
                 .filter(|extended| keeps_wheels(&model.fit, &extended.fit) && !effects_cancel(extended))
         };
         let best = SEARCH.max_sparse_refits.min(trials);
-        let few = |few: &[Scored]| few.par_iter().filter_map(with).collect::<Vec<_>>();
-        Some(Self {
-            model,
-            p_value,
-            trials,
-            refitted: scored[..best].chunks(SEARCH.max_fits_at_a_time).flat_map(few).collect(),
-        })
+        Some(Self { model, p_value, trials, refitted: refit_each(&scored[..best], with) })
     }
 
     /// The best of them that predicts held-out runs better, if the best is significant by its score, and

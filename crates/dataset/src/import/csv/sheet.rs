@@ -206,12 +206,12 @@ impl Sheet {
         }
     }
 
-    /// A line that is none of such a table.
+    /// The error for a line that does not fit the table's format.
     pub(super) fn foreign(&self, line: u64, message: String) -> DatasetError {
         DatasetError::Foreign { file: self.file.clone(), line, message }
     }
 
-    /// A header that is none of such a table.
+    /// The same for the header.
     pub(super) fn foreign_header(&self, message: String) -> DatasetError {
         self.foreign(self.header_line.unwrap_or(1), message)
     }

@@ -85,7 +85,7 @@ fn a_clock_of_all_runs_joins_what_was_found_of_it_and_that_of_a_run_does_not() {
 fn faults_come_first_and_then_what_is_most_significant() {
     let datasets = [session(0, 0.0)];
     let structure = structure(&datasets, &[]);
-    let (one, faults) = (fault("swapped_wheels"), [fault("swapped_wheels")]);
+    let (one, faults) = (fault("swapped_wheels"), [&fault("swapped_wheels")]);
     let of = StageResults { faults: &faults, ..results(&datasets, &structure) };
     let first = record_faults(&of, Vec::new());
     assert_eq!(first, [finding::of_fault(&one)]);
@@ -135,7 +135,7 @@ fn a_drift_takes_its_remainder_and_one_without_a_name_takes_nothing() {
 fn failed_checks_are_reported_where_nothing_explains_them() {
     let datasets = [session(0, 0.0)];
     let speed = || Check::Covariate("speed".to_owned());
-    let reported = |p_value, before: Vec<Finding>, faults: &[Fault]| {
+    let reported = |p_value, before: Vec<Finding>, faults: &[&Fault]| {
         let structure = structure(&datasets, &[(speed(), p_value, false)]);
         let of = StageResults { faults, ..results(&datasets, &structure) };
         let number = before.len();
@@ -147,7 +147,9 @@ fn failed_checks_are_reported_where_nothing_explains_them() {
     let unknown = of_causes(vec![], 1e-9, BTreeMap::new(), Basis::Autocorrelated(0.3, ErrorsAtRest::Autocorrelated));
     assert!(!reported(1e-9, vec![unknown], &[]));
     // So do counts that are restored roughly, and not every fault.
-    assert!(!reported(1e-9, vec![], &[fault("dropped_samples")]) && reported(1e-9, vec![], &[fault("swapped_wheels")]));
+    assert!(
+        !reported(1e-9, vec![], &[&fault("dropped_samples")]) && reported(1e-9, vec![], &[&fault("swapped_wheels")])
+    );
 }
 
 #[test]
@@ -172,8 +174,9 @@ fn what_the_log_shows_without_a_name_doubts_all_but_the_faults() {
     let structure = structure(&datasets, &[]);
     let failed = |check| TestResult { check, statistic: 7.0, p_value: 1e-9, passes: false };
     let (rows, spans) = (failed(Check::LogRows), failed(Check::LogSpans));
-    let faults = [fault("swapped_wheels")];
-    let before = || vec![finding::of_fault(&faults[0]), mean("slip_speed", 9.0)];
+    let swapped = fault("swapped_wheels");
+    let faults = [&swapped];
+    let before = || vec![finding::of_fault(&swapped), mean("slip_speed", 9.0)];
     let doubts = |log, spans| {
         let of = StageResults { faults: &faults, log, spans, ..results(&datasets, &structure) };
         let all = faults_of_the_log(&of, before());
@@ -183,7 +186,7 @@ fn what_the_log_shows_without_a_name_doubts_all_but_the_faults() {
     assert_eq!(doubts(Some(&rows), None), (3, 0, 1));
     // Times in other units doubt the fault as well.
     assert_eq!(doubts(None, Some(&spans)), (3, 1, 1));
-    let lost = [fault("dropped_samples")];
+    let lost = [&fault("dropped_samples")];
     let of = StageResults { faults: &lost, log: Some(&rows), ..results(&datasets, &structure) };
     assert_eq!(faults_of_the_log(&of, before()).len(), 2, "rows that are restored roughly are off");
 }
