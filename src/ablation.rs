@@ -15,6 +15,8 @@ use crate::terminal::Failure;
 struct Ablation {
     off: Vec<Rule>,
     decisions: Option<PathBuf>,
+    dataset: dataset::settings::Settings,
+    effects: effects::settings::Settings,
     preflight: preflight::settings::Settings,
     estimation: estimation::settings::Settings,
     diagnose: diagnose::settings::Settings,
@@ -23,9 +25,11 @@ struct Ablation {
 /// Takes the settings of a file, and switches its rules off; returns the file for the decisions.
 pub(crate) fn begin(file: &Path) -> Result<Option<PathBuf>, Failure> {
     let unreadable = |error: toml::de::Error| format!("{}: {}", file.display(), error.message());
-    let Ablation { off, decisions, preflight, estimation, diagnose } =
+    let Ablation { off, decisions, dataset, effects, preflight, estimation, diagnose } =
         toml::from_str(&read_text(file)?).map_err(unreadable)?;
     rules::switch_off(off)?;
+    dataset::settings::install(dataset)?;
+    effects::settings::install(effects)?;
     preflight::settings::install(preflight)?;
     estimation::settings::install(estimation)?;
     diagnose::settings::install(diagnose)?;

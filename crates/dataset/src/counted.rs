@@ -12,10 +12,7 @@ use kinematics::{DriveGeometry, Side, Twist, Wheels};
 
 use crate::order_statistics::median;
 use crate::record::{NominalRobot, Run, WheelLog};
-use crate::settings::{
-    COUNT_TOLERANCE, COUNT_TOLERANCE_RATIO, MAX_CHANCE_OF_COUNTS, MAX_COUNTS, MAX_ROUNDED_COUNTS, MIN_COUNT_ERROR,
-    MIN_COUNT_TOLERANCE, MIN_COUNTED_SHARE,
-};
+use crate::settings::ROUNDED_RATES;
 
 /// Puts counts in place of recorded angles, where these are a whole number of the stated counts but for their
 /// rounding, and of rates, where these are one in a sampling period, in the mean time between rows, or in the
@@ -209,10 +206,11 @@ fn of_both(counts: Wheels<Option<f64>>) -> Option<Wheels<f64>> {
 /// The nearest whole number of counts; `None` where the rounding leaves open which it is, none is within it,
 /// or there are so many that any number is whole.
 fn nearest_count(counts: f64, rounded: f64) -> Option<f64> {
-    let nearest = counts.round();
-    let tolerance = (COUNT_TOLERANCE_RATIO * nearest.abs()).clamp(MIN_COUNT_TOLERANCE, COUNT_TOLERANCE);
+    let (settings, nearest) = (&*ROUNDED_RATES, counts.round());
+    let tolerance = settings.count_tolerance_ratio * nearest.abs();
+    let tolerance = tolerance.clamp(settings.min_count_tolerance, settings.max_count_tolerance);
     let is_within = (counts - nearest).abs() <= rounded + tolerance;
-    (is_within && rounded <= MAX_ROUNDED_COUNTS && nearest.abs() <= MAX_COUNTS).then_some(nearest)
+    (is_within && rounded <= settings.max_rounded_counts && nearest.abs() <= settings.max_counts).then_some(nearest)
 }
 
 /// Are nearly all rows in which a wheel turned made of counts, and of so many numbers that it is no chance?
@@ -220,15 +218,17 @@ fn nearest_count(counts: f64, rounded: f64) -> Option<f64> {
 /// that drives evenly says the same again and again, so that a number counts once; but a row below or above
 /// both of those beside it is no even drive.
 fn are_counted(runs: &[&impl Counted]) -> bool {
+    let settings = &*ROUNDED_RATES;
     let moving = || runs.iter().flat_map(|run| &run.counts().by_row).filter(|of| **of != Some(Wheels::both(0.0)));
     let counted: Vec<&Wheels<f64>> = moving().flatten().collect();
     let numbers: BTreeSet<(Side, i64)> =
         counted.iter().flat_map(|of| Side::BOTH.map(|side| (side, of[side] as i64))).collect();
     // Whole numbers themselves are of a period that is known to so much.
-    let off = runs.iter().map(|run| run.counts().off).fold(MIN_COUNT_ERROR, f64::max);
+    let off = runs.iter().map(|run| run.counts().off).fold(settings.min_count_error, f64::max);
     let alone: usize = runs.iter().map(|run| rows_alone(&run.counts().by_row)).sum();
     let log_chance = (numbers.len() + alone) as f64 * (2.0 * off).ln();
-    log_chance <= MAX_CHANCE_OF_COUNTS.ln() && counted.len() as f64 >= MIN_COUNTED_SHARE * moving().count() as f64
+    log_chance <= settings.max_chance_of_counts.ln()
+        && counted.len() as f64 >= settings.min_counted_share * moving().count() as f64
 }
 
 /// In how many rows a wheel turns faster or slower than in both of those beside it.

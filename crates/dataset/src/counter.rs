@@ -6,25 +6,11 @@
 use kinematics::Side;
 
 use crate::record::{Dataset, WheelLog};
+use crate::settings::{COUNTERS, USUAL_COUNTER_BITS};
 use crate::warning::Warning;
-
-/// Widths that counters come in, bits.
-const USUAL_BITS: [u8; 4] = [8, 16, 24, 32];
 
 /// Widths for which [`unwrap`] is defined: one bit has no sign, and 64 need no help.
 pub(crate) const ACCEPTED_BITS: std::ops::RangeInclusive<u8> = 2..=63;
-
-/// Unwrapping must make the largest increment this many times smaller before it is believed: a robot that
-/// once moved fast between two rows has increments of all sizes, a wrap leaves nothing between the usual ones
-/// and nearly 2ⁿ.
-const BELIEVED_SHRINKAGE: u64 = 4;
-
-/// An unwrapped jump may be so many times larger than any of the increments beside it: that many rows may be
-/// lost there. A counter that is set to 0 near 2ⁿ leaves more.
-const BELIEVED_RATIO: u64 = 10;
-
-/// How many increments count on each side of a jump: a robot may stand before it.
-const STEPS_BESIDE: usize = 3;
 
 /// An increment modulo 2^bits, in [−2^(bits−1), 2^(bits−1)).
 fn wrapped(increment: i64, bits: u8) -> i64 {
@@ -69,31 +55,30 @@ fn width_of_jumps(ticks: &[i64]) -> Option<u8> {
     let span = ticks.iter().max()?.abs_diff(*ticks.iter().min()?);
     let increments = || ticks.windows(2).map(|pair| pair[1].wrapping_sub(pair[0]));
     let largest = increments().map(i64::unsigned_abs).max()?;
-    USUAL_BITS.into_iter().find(|&bits| {
+    let shrinkage = COUNTERS.min_unwrapped_shrinkage;
+    USUAL_COUNTER_BITS.into_iter().find(|&bits| {
         let half_turn = 1_u64 << (bits - 1);
         if span >= 2 * half_turn || largest <= half_turn {
             return false;
         }
         let jumps = increments().filter(|increment| increment.unsigned_abs() > half_turn).count();
         let unwrapped = increments().map(|increment| wrapped(increment, bits).unsigned_abs()).max();
-        2 * jumps < ticks.len() && unwrapped.is_some_and(|unwrapped| BELIEVED_SHRINKAGE * unwrapped <= largest)
+        2 * jumps < ticks.len() && unwrapped.is_some_and(|unwrapped| shrinkage * unwrapped <= largest)
     })
 }
 
 /// Whether the jumps of a counter of some width are, unwrapped, like the increments beside them.
 fn jumps_are_usual_steps(ticks: &[i64], bits: u8) -> bool {
+    let (beside, most) = (COUNTERS.steps_beside_jump, COUNTERS.max_unwrapped_ratio);
     let increment = |row: usize| ticks[row + 1].wrapping_sub(ticks[row]);
     let rows = ticks.len().saturating_sub(1);
     let step = |row: usize| wrapped(increment(row), bits).unsigned_abs();
     (0..rows).filter(|&row| increment(row).unsigned_abs() > 1 << (bits - 1)).all(|jump| {
-        let beside = jump.saturating_sub(STEPS_BESIDE)..rows.min(jump + STEPS_BESIDE + 1);
-        let usual = beside.filter(|&row| row != jump).map(step).max().unwrap_or(0);
-        step(jump) <= BELIEVED_RATIO.saturating_mul(usual)
+        let near = jump.saturating_sub(beside)..rows.min(jump + beside + 1);
+        let usual = near.filter(|&row| row != jump).map(step).max().unwrap_or(0);
+        step(jump) <= most.saturating_mul(usual)
     })
 }
-
-/// Leaps of a spike are so many times larger than any other increment.
-const SPIKE_RATIO: u64 = 1000;
 
 fn spike(ticks: &[i64]) -> Option<usize> {
     // Columns may be as large as the memory: nothing is collected.
@@ -108,13 +93,13 @@ fn spike(ticks: &[i64]) -> Option<usize> {
     let others = (0..rows).filter(|row| *row != away && *row != away + 1);
     let usual = others.map(|row| increment(row).unsigned_abs()).max()?.max(1);
     let leaps = [increment(away), increment(away + 1)];
-    let is_leap = leaps.iter().all(|leap| leap.unsigned_abs() > SPIKE_RATIO.saturating_mul(usual));
+    let is_leap = leaps.iter().all(|leap| leap.unsigned_abs() > COUNTERS.min_spike_ratio.saturating_mul(usual));
     // Twice: the row's own motion is in one of both leaps, and a row may be lost.
     let wraps = |bits: &u8| {
         let is_one = |leap: &i64| leap.unsigned_abs() < 1 << bits;
         leaps.iter().all(|leap| is_one(leap) && wrapped(*leap, *bits).unsigned_abs() <= usual.saturating_mul(2))
     };
-    (is_leap && !USUAL_BITS.iter().any(wraps)).then_some(away + 1)
+    (is_leap && !USUAL_COUNTER_BITS.iter().any(wraps)).then_some(away + 1)
 }
 
 /// Warnings of all wheels that show a wrap; none when the width is known, as they have been unwrapped then.
@@ -178,7 +163,7 @@ mod tests {
         fn a_drive_through_the_counters_end_is_suspected_and_its_unwrapped_self_is_not(
             step in 1_i64..30, uneven: bool, backward: bool, signed: bool, width in 0_usize..4,
         ) {
-            let bits = USUAL_BITS[width];
+            let bits = USUAL_COUNTER_BITS[width];
             // Uneven steps still go one way: a wheel that rattles on the counter's end wraps at every row.
             let jitter = if uneven { step / 3 } else { 0 };
             let sign = if backward { -1 } else { 1 };

@@ -1,12 +1,7 @@
 //! Mean rates over intervals from rates at instants.
 
 use crate::order_statistics::median;
-
-/// Longest step between two rates that is bridged, in median steps: one or two may be lost, and the rate in
-/// between is nearly linear. Derived: a robot turns up to some 3 rad/s², an IMU measures 50 times a second or
-/// more; where that sets in half-way, the mean over 3 steps of 20 ms is off by 3 rad/s² · 60 ms / 8 = 0.02
-/// rad/s.
-const MAX_STEP_IN_MEDIANS: f64 = 3.5;
+use crate::settings::ROUNDED_RATES;
 
 /// Mean rates over the intervals that end at `rows`; NaN where they are not known: before the first rate,
 /// after the last, and across a step of more than 3.5 median steps between two. The first row ends no
@@ -16,7 +11,7 @@ const MAX_STEP_IN_MEDIANS: f64 = 3.5;
 /// instant to another.
 pub fn interval_means<T: Copy + PartialOrd>(rates: &[(T, f64)], rows: &[T], seconds: impl Fn(T, T) -> f64) -> Vec<f64> {
     let steps_s = || rates.windows(2).map(|pair| seconds(pair[0].0, pair[1].0));
-    let longest_s = median(steps_s()).map_or(0.0, |median_s| MAX_STEP_IN_MEDIANS * median_s);
+    let longest_s = median(steps_s()).map_or(0.0, |median_s| ROUNDED_RATES.max_bridged_steps * median_s);
     // The angle up to each rate, and how many holes are before it.
     let mut before: Vec<(f64, usize)> = vec![(0.0, 0)];
     for (pair, step_s) in rates.windows(2).zip(steps_s()) {

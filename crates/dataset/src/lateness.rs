@@ -1,8 +1,6 @@
 //! How late rows are stamped, against the beat of the rows around them.
 
-/// Rows to either side whose line is the beat: 500 rows know it to a twentieth of what stamps jitter by, and
-/// in five seconds a clock keeps its beat.
-pub(crate) const LINE_ROWS: usize = 250;
+use crate::settings::TIME_BASE;
 
 /// Whether no neighbour has a row's number; numbers do not fall.
 pub(crate) fn is_alone(numbers: &[i64], row: usize) -> bool {
@@ -13,7 +11,7 @@ pub(crate) fn is_alone(numbers: &[i64], row: usize) -> bool {
 /// How late each stamp is against the line through the rows around it that are alone of their ticks: one that
 /// came by itself is on no line. Through all of them where hardly any is alone.
 pub(crate) fn lateness(t_s: &[f64], numbers: &[i64], period_s: f64) -> Vec<f64> {
-    let rows = t_s.len();
+    let (rows, line_rows) = (t_s.len(), TIME_BASE.line_rows);
     // Sums of a window slide along; times over numbers stay small for precision.
     let mut sums = Sums::default();
     let (mut from, mut to) = (0, 0);
@@ -21,11 +19,11 @@ pub(crate) fn lateness(t_s: &[f64], numbers: &[i64], period_s: f64) -> Vec<f64> 
     let most_are = (0..rows).filter(|row| is_alone(numbers, *row)).count() * 2 > rows;
     let weight = |row: usize| if is_alone(numbers, row) || !most_are { 1.0 } else { 0.0 };
     let late = |row: usize| {
-        while to < rows.min(row + LINE_ROWS + 1) {
+        while to < rows.min(row + line_rows + 1) {
             sums.add(point(to), weight(to));
             to += 1;
         }
-        while from + LINE_ROWS < row {
+        while from + line_rows < row {
             sums.add(point(from), -weight(from));
             from += 1;
         }

@@ -10,23 +10,7 @@ use std::ops::Range;
 
 use crate::lateness::Sums;
 use crate::receipt_delays::{Received, rows_on_heels};
-
-/// Share of the packets that have as many rows at the least, and of those that have more at the most: a row
-/// of others is lost. Of rows that hold up each other by chance, bunches of one size are half at most, and
-/// many have more.
-const MIN_WHOLE_SHARE: f64 = 0.5;
-const MAX_LARGER_SHARE: f64 = 0.02;
-/// Share of the packets that have half to twice as many rows as the middle one, at the least; of bunches by
-/// chance about half do.
-const MIN_SIMILAR_SHARE: f64 = 0.9;
-/// Rows of a packet at the least: two come on each other's heels where a motion ends.
-const MIN_ROWS: usize = 2;
-/// What packets that have now more and now fewer rows are off the rows' beat by at the most, root mean
-/// square, in beats. A sender that looks now and then is late by up to one: 0.29. So many rows that are lost
-/// anywhere make it twice as much, √(n/15) of a random walk about its line; where fewer packets are short,
-/// rows were lost.
-const MAX_OFF: f64 = 0.45;
-const MIN_SHORT: usize = 12;
+use crate::settings::PACKET_SIZES;
 
 /// The rows of each packet.
 pub(crate) struct Packets {
@@ -41,6 +25,7 @@ pub(crate) struct Packets {
 impl Packets {
     /// By stamps that do not fall; `None` where rows do not come in packets.
     fn of(t_s: &[f64]) -> Option<Self> {
+        let settings = &*PACKET_SIZES;
         let (_, on_heels) = rows_on_heels(t_s)?;
         let firsts: Vec<usize> = (0..t_s.len()).filter(|row| !on_heels[*row]).collect();
         let ends = firsts[1..].iter().copied().chain([t_s.len()]);
@@ -53,14 +38,19 @@ impl Packets {
         };
         let most_often = sizes.chunk_by(|a, b| a == b).max_by_key(|alike| alike.len())?[0];
         let whole = share(&|rows| rows == most_often);
-        let are_alike = whole >= MIN_WHOLE_SHARE && share(&|rows| rows > most_often) <= MAX_LARGER_SHARE;
+        let are_alike =
+            whole >= settings.min_whole_share && share(&|rows| rows > most_often) <= settings.max_larger_share;
         let middle = sizes[sizes.len() / 2];
-        let are_similar = || share(&|rows| 2 * rows >= middle && rows <= 2 * middle) >= MIN_SIMILAR_SHARE;
+        let similar = || share(&|rows| 2 * rows >= middle && rows <= 2 * middle);
         let short = sizes.iter().filter(|rows| **rows < most_often).count();
-        let row_timing_s =
-            if (!are_alike || short >= MIN_SHORT) && are_similar() { row_timing_s(&of, t_s) } else { None };
+        let may_vary = (!are_alike || short >= settings.min_short_packets) && similar() >= settings.min_similar_share;
+        let row_timing_s = if may_vary { row_timing_s(&of, t_s) } else { None };
         let rows = if row_timing_s.is_some() { middle } else { most_often };
-        (rows >= MIN_ROWS && (are_alike || row_timing_s.is_some())).then_some(Self { of, rows, row_timing_s })
+        (rows >= settings.min_packet_rows && (are_alike || row_timing_s.is_some())).then_some(Self {
+            of,
+            rows,
+            row_timing_s,
+        })
     }
 
     /// When rows were read that are sent some at a time. Where packets have as many rows each, it is found of
@@ -107,7 +97,8 @@ fn row_timing_s(packets: &[Range<usize>], t_s: &[f64]) -> Option<[f64; 2]> {
     let first_s = line.line_at(0.0);
     let period_s = mean_period_s + (line.line_at(rows) - first_s) / rows;
     let squares_s2: f64 = sent().map(|(row, sent_s)| (sent_s - first_s - period_s * row).powi(2)).sum();
-    ((squares_s2 / packets.len() as f64).sqrt() <= MAX_OFF * period_s).then_some([first_s, period_s])
+    ((squares_s2 / packets.len() as f64).sqrt() <= PACKET_SIZES.max_packet_off * period_s)
+        .then_some([first_s, period_s])
 }
 
 /// How many rows come at a time, usually, where a log's rows are kept and sent in packets; by stamps that do

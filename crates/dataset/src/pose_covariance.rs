@@ -1,10 +1,6 @@
 //! The covariance of one measured pose, as a row of the truth states it.
 
-/// Least determinant of a matrix of correlations: below it a combination of coordinates would be known
-/// exactly.
-/// Derived: rows with six digits have determinants that are off by some 1e-6 at most; no instrument
-/// correlates its errors to 1 − 1e-9.
-const MIN_DETERMINANT: f64 = 1e-9;
+use crate::settings::MIN_DETERMINANT;
 
 /// Covariance of the errors of one measured pose, in the room's frame.
 ///

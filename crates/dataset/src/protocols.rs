@@ -4,6 +4,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use crate::record::{Dataset, NominalRobot, Odometry, Protocol, ProtocolSettings};
 use crate::run_motion::{RunMotion, increments};
+use crate::settings::LABELS;
 
 /// Gives each run without a protocol that of what it plainly drove by the stated robot: a straight, a spin,
 /// or a square with turns on the spot either way. Nothing is said of its lengths and turns: the stated
@@ -27,11 +28,7 @@ fn recognised(odometry: &Odometry, robot: &NominalRobot) -> Option<Protocol> {
 /// Four sides of one length with right turns on the spot between them: three, or four with the last at the
 /// start.
 fn has_four_sides(odometry: &Odometry, robot: &NominalRobot) -> bool {
-    /// What a turn and a side may be off by, by a robot that is stated wrongly or drives by hand.
-    const MAX_TURN_ERROR_RAD: f64 = PI / 6.0;
-    const MAX_SIDE_RATIO: f64 = 1.25;
-    /// Turns below are those of a controller that keeps its course.
-    const MIN_TURN_RAD: f64 = PI / 18.0;
+    let settings = &*LABELS;
     let Some(increments) = increments(odometry, robot) else { return false };
     let half_base_m = 0.5 * robot.wheel_separation_m;
     let (mut sides_m, mut turns_rad, mut turn_rad) = (vec![0.0], Vec::new(), 0.0_f64);
@@ -39,7 +36,7 @@ fn has_four_sides(odometry: &Odometry, robot: &NominalRobot) -> bool {
         if step.turn_rad.abs() * half_base_m > step.distance_m.abs() {
             turn_rad += step.turn_rad;
         } else {
-            if turn_rad.abs() > MIN_TURN_RAD && step.distance_m != 0.0 {
+            if turn_rad.abs() > settings.min_turn_rad && step.distance_m != 0.0 {
                 turns_rad.push(turn_rad);
                 sides_m.push(0.0);
             }
@@ -51,12 +48,12 @@ fn has_four_sides(odometry: &Odometry, robot: &NominalRobot) -> bool {
             }
         }
     }
-    if turn_rad.abs() > MIN_TURN_RAD {
+    if turn_rad.abs() > settings.min_turn_rad {
         turns_rad.push(turn_rad);
     }
     let (least_m, most_m) = sides_m.iter().fold((f64::MAX, 0.0_f64), |(a, b), side_m| (a.min(*side_m), b.max(*side_m)));
-    let are_right = turns_rad.iter().all(|turn_rad| (turn_rad.abs() - FRAC_PI_2).abs() < MAX_TURN_ERROR_RAD);
-    sides_m.len() == 4 && (3..=4).contains(&turns_rad.len()) && are_right && most_m < MAX_SIDE_RATIO * least_m
+    let are_right = turns_rad.iter().all(|turn_rad| (turn_rad.abs() - FRAC_PI_2).abs() < settings.max_turn_error_rad);
+    sides_m.len() == 4 && (3..=4).contains(&turns_rad.len()) && are_right && most_m < settings.max_side_ratio * least_m
 }
 
 /// What a run drove: a label only where all of the run is like it, else `free`.
@@ -72,18 +69,7 @@ fn has_four_sides(odometry: &Odometry, robot: &NominalRobot) -> bool {
 /// All but `free` go one way: forward or backward, left or right. The runs of the study's `circular` folder
 /// are spirals: half turns of a radius that shrinks from 0.375 m. Their mean is what one number can say.
 pub(crate) fn label(motion: &RunMotion, side_m: Option<f64>) -> (Protocol, ProtocolSettings) {
-    const MOVES_M: f64 = 0.1;
-    const EIGHTH_RAD: f64 = TAU / 8.0;
-    /// The study's straights keep within 4°.
-    const STRAIGHT_RAD: f64 = TAU / 36.0;
-    /// What of a path or of the headings may go the other way: the study's squares have 2 %.
-    const ONE_WAY: f64 = 0.95;
-    /// The study's spirals are uneven by 0.043 to 0.068 of their turn; a drive of two different arcs by more.
-    const UNEVEN: f64 = 0.1;
-    /// The study's circles turn for 3 % with wheels in opposite directions, as they start and stop.
-    const ON_THE_SPOT: f64 = 0.1;
-    /// The study's squares are 1 % short by the nominal robot.
-    const SIDES: f64 = 0.1;
+    let settings = &*LABELS;
     let none = ProtocolSettings::default();
     let free = (Protocol::Free, none);
     // Counts that are no robot's give lengths that are none.
@@ -92,27 +78,29 @@ pub(crate) fn label(motion: &RunMotion, side_m: Option<f64>) -> (Protocol, Proto
         return free;
     }
     let turn_rad = motion.turn_rad.abs();
-    let turns_one_way = turn_rad >= ONE_WAY * motion.heading_range_rad;
+    let turns_one_way = turn_rad >= settings.min_one_way_share * motion.heading_range_rad;
     let clockwise = motion.turn_rad < 0.0;
-    if motion.path_m < MOVES_M {
-        if turn_rad < EIGHTH_RAD || !turns_one_way {
+    if motion.path_m < settings.min_path_m {
+        if turn_rad < settings.eighth_turn_rad || !turns_one_way {
             return free;
         }
         let turn_rad = (motion.turn_rad / PI).round() * PI;
         return (Protocol::Spin, ProtocolSettings { turn_rad: Some(turn_rad), ..none });
     }
-    if motion.distance_m.abs() < ONE_WAY * motion.path_m {
+    if motion.distance_m.abs() < settings.min_one_way_share * motion.path_m {
         return free;
     }
-    if motion.heading_range_rad < STRAIGHT_RAD {
+    if motion.heading_range_rad < settings.max_straight_rad {
         let length_m = (motion.distance_m * 100.0).round() / 100.0;
         return (Protocol::Straight, ProtocolSettings { length_m: Some(length_m), ..none });
     }
-    let sides = side_m.is_none_or(|side_m| (motion.distance_m.abs() / (4.0 * side_m) - 1.0).abs() < SIDES);
-    let is_square = (turn_rad - TAU).abs() < EIGHTH_RAD && motion.on_the_spot_rad > 0.5 * motion.turning_rad && sides;
-    let is_circle = turn_rad >= 4.0 * EIGHTH_RAD
-        && motion.on_the_spot_rad < ON_THE_SPOT * motion.turning_rad
-        && motion.uneven_rad < UNEVEN * turn_rad;
+    let sides =
+        side_m.is_none_or(|side_m| (motion.distance_m.abs() / (4.0 * side_m) - 1.0).abs() < settings.max_side_error);
+    let is_square =
+        (turn_rad - TAU).abs() < settings.eighth_turn_rad && motion.on_the_spot_rad > 0.5 * motion.turning_rad && sides;
+    let is_circle = turn_rad >= 4.0 * settings.eighth_turn_rad
+        && motion.on_the_spot_rad < settings.max_on_the_spot_share * motion.turning_rad
+        && motion.uneven_rad < settings.max_uneven_share * turn_rad;
     match (turns_one_way, is_square, is_circle) {
         (true, true, _) => {
             let protocol = if clockwise { Protocol::SquareCw } else { Protocol::SquareCcw };

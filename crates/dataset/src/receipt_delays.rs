@@ -11,51 +11,7 @@
 //! Where delays are many beats, single steps cannot be told; the mean over all of them is then what a line
 //! through the stamps would be, with as many rows to it as the steps let agree.
 
-/// Cells of the grid in a beat.
-const CELLS: i64 = 8;
-/// Step of the shares of rows that are lost, or, below zero, that came between two ticks, of which the
-/// likeliest is sought at first: half a beat of 500 rows. Between two steps the likelihood may have a peak of
-/// its own.
-const LOST_STEP: f64 = 1e-3;
-/// Steps of either sign that are all tried; beyond them every fifth is.
-const MAX_FINE_STEPS: i32 = 20;
-/// Most steps of either sign.
-const MAX_LOST_STEPS: i32 = 80;
-/// Steps in which the share is then sought: at first half of those above, and at the least.
-const LOST_STEPS: [f64; 2] = [5e-4, 1.5e-4];
-/// Log odds against rows that are lost or came between ticks at all.
-const LOST_COST: f64 = 8.0;
-/// Mean of the share of rows that are lost, which falls off exponentially: where delays are beats long, rows
-/// tell hardly more than that some are.
-const USUAL_LOST: f64 = 0.01;
-/// Probability of a step of one beat at a row, in either direction, where none is expected.
-const MIN_STEPS: f64 = 3e-4;
-/// Rows by which the share is found.
-const LOST_ROWS: usize = 3000;
-/// Probability that the clock walks by a cell at a row: a beat in 60,000 rows, root mean square of a walk.
-const WALK: f64 = 1e-3;
-/// Cells whose share of the likeliest one's probability is less are left out.
-const MIN_SHARE: f64 = 1e-9;
-/// Rows whose predicted probability is less begin anew, as after a pause that is no whole number of beats.
-const MIN_PROBABILITY: f64 = 1e-12;
-/// Beats by which a row is received before it was read, in the mean: the beat is not known exactly.
-const EARLY: f64 = 0.05;
-/// Mean delays over which a row is sought at first, beside the ones that hold each other up.
-const FIRST_DELAYS: f64 = 12.0;
-/// Mean delays are found to a twentieth, and sought from one beat on in steps of twice as much at first.
-const MEANS_PER_E: f64 = 20.0;
-const FIRST_STEP: f64 = 16.0;
-/// Mean delays of more beats are none of single rows: a log that is written in blocks has one stamp a block.
-/// The grid grows with them.
-const MAX_MEAN: f64 = 40.0;
-/// Rows of which the probabilities are kept at once.
-const BLOCK_ROWS: usize = 1024;
-/// A row that comes in less of a beat behind another was held up by it.
-const HELD_UP_GAP: f64 = 0.2;
-/// Rows come in bunches where more than this share of them was held up.
-const MIN_HELD_UP_SHARE: f64 = 0.1;
-/// Beats without a row from which on a log pauses: the slope of its beat is that between pauses.
-const PAUSE: f64 = 100.0;
+use crate::settings::{BLOCK_ROWS, GRID_CELLS, RECEIPT};
 
 /// Stamps against their beat.
 struct Rows {
@@ -84,16 +40,18 @@ struct Delays {
 
 impl Delays {
     fn of(mean: f64, lost: f64) -> Self {
-        Self { mean, later: lost.max(MIN_STEPS), earlier: (-lost).max(MIN_STEPS) }
+        let least = RECEIPT.min_step_probability;
+        Self { mean, later: lost.max(least), earlier: (-lost).max(least) }
     }
 
     /// Multiplies the shares by the likelihood of a row's stamp.
     fn weigh(&self, rows: &Rows, row: usize, beam: &mut Beam) {
-        let cell = 1.0 / CELLS as f64;
+        let cell = 1.0 / GRID_CELLS as f64;
         // exp(−delay/mean) grows from cell to cell by the same factor.
         let mut delay = rows.late[row] - cell * beam.first as f64;
         let (mut free, growth) = ((-delay / self.mean).exp(), (cell / self.mean).exp());
-        let (ready, of_early) = ((-EARLY / self.mean).exp(), -(-EARLY / self.mean).exp_m1());
+        let early_periods = RECEIPT.early_periods;
+        let (ready, of_early) = ((-early_periods / self.mean).exp(), -(-early_periods / self.mean).exp_m1());
         let held_up = rows.held_up[row];
         let mut shares = beam.shares.iter_mut();
         while delay >= 0.0
@@ -103,8 +61,8 @@ impl Delays {
             delay -= cell;
             free *= growth;
         }
-        // exp(delay/EARLY) falls likewise.
-        let (mut early, decay) = ((delay / EARLY).exp(), (-cell / EARLY).exp());
+        // exp(delay/early_periods) falls likewise.
+        let (mut early, decay) = ((delay / early_periods).exp(), (-cell / early_periods).exp());
         let of_early = if held_up { of_early } else { self.mean.recip() };
         for share in shares {
             *share *= of_early * early;
@@ -124,9 +82,9 @@ impl Delays {
 
     /// The cells that a row alone leaves open, all alike.
     fn first(&self, rows: &Rows, row: usize) -> Beam {
-        let cells = |beats: f64| (beats * CELLS as f64) as i64;
-        let last = cells(rows.late[row]) + CELLS;
-        let first = last - cells(FIRST_DELAYS * (1.0 + self.mean)) - 2 * CELLS;
+        let cells = |beats: f64| (beats * GRID_CELLS as f64) as i64;
+        let last = cells(rows.late[row]) + GRID_CELLS;
+        let first = last - cells(RECEIPT.first_delays * (1.0 + self.mean)) - 2 * GRID_CELLS;
         let mut beam = Beam { first, shares: vec![1.0; (last - first + 1) as usize] };
         self.weigh(rows, row, &mut beam);
         beam
@@ -138,13 +96,13 @@ impl Delays {
             let mut beam = self.step(before);
             self.weigh(rows, row, &mut beam);
             let sum: f64 = beam.shares.iter().sum();
-            if sum > MIN_PROBABILITY {
+            if sum > RECEIPT.min_row_probability {
                 return (beam.trimmed(), sum.ln(), false);
             }
         }
         let beam = self.first(rows, row);
         let open = beam.shares.len() as f64;
-        (beam.trimmed(), MIN_PROBABILITY.ln() - open.ln(), true)
+        (beam.trimmed(), RECEIPT.min_row_probability.ln() - open.ln(), true)
     }
 
     /// Log likelihood of all rows, and the beams before each block of them.
@@ -178,7 +136,7 @@ impl Delays {
             }
             for (row, (beam, begins)) in (from..to).zip(&beams).rev() {
                 let all = beam.times(behind.as_ref());
-                let cell = |k: usize| (all.first + k as i64) as f64 / CELLS as f64;
+                let cell = |k: usize| (all.first + k as i64) as f64 / GRID_CELLS as f64;
                 expected[row] = all.shares.iter().enumerate().map(|(k, share)| share * cell(k)).sum();
                 behind = (!begins).then(|| {
                     // All cells of the beam say what comes of them; others are not asked.
@@ -195,10 +153,11 @@ impl Delays {
 impl Beam {
     /// Shares that go a beat down and a beat up, walk by a cell, or stay.
     fn spread(&self, down: f64, up: f64) -> Self {
-        let extent = CELLS as usize;
+        let extent = GRID_CELLS as usize;
+        let walk_probability = RECEIPT.walk_probability;
         let mut shares = vec![0.0; self.shares.len() + 2 * extent];
-        let walk = 0.5 * WALK;
-        let stay = 1.0 - down - up - WALK;
+        let walk = 0.5 * walk_probability;
+        let stay = 1.0 - down - up - walk_probability;
         for (k, share) in self.shares.iter().enumerate() {
             shares[k] += down * share;
             shares[k + extent - 1] += walk * share;
@@ -206,7 +165,7 @@ impl Beam {
             shares[k + extent + 1] += walk * share;
             shares[k + 2 * extent] += up * share;
         }
-        Self { first: self.first - CELLS, shares }
+        Self { first: self.first - GRID_CELLS, shares }
     }
 
     fn scaled(mut self) -> Self {
@@ -217,7 +176,7 @@ impl Beam {
 
     /// Without the cells at its ends that are improbable, scaled.
     fn trimmed(mut self) -> Self {
-        let least = MIN_SHARE * self.shares.iter().copied().fold(0.0, f64::max);
+        let least = RECEIPT.min_cell_ratio * self.shares.iter().copied().fold(0.0, f64::max);
         let counts = |share: &f64| *share > least;
         let last = self.shares.iter().rposition(counts).unwrap_or(0);
         let first = self.shares.iter().position(counts).unwrap_or(0);
@@ -258,36 +217,38 @@ pub(crate) struct Received {
 impl Received {
     /// By stamps that do not fall; `None` where rows do not hold up each other.
     pub(crate) fn of(t_s: &[f64]) -> Option<Self> {
+        let settings = &*RECEIPT;
         let (gap_s, held_up) = rows_on_heels(t_s)?;
         let rows = |lost: f64, most: usize| {
             let period_s = gap_s / (1.0 + lost);
             let late = (0..most).map(|row| (t_s[row] - t_s[0]) / period_s - row as f64).collect();
             Rows { late, held_up: held_up[..most].to_vec() }
         };
-        let mean_of = |steps: f64| (steps / MEANS_PER_E).exp();
+        let mean_of = |steps: f64| (steps / settings.mean_steps_per_e).exp();
         let likeliest_mean = |first: f64, lost: f64, rows: &Rows| {
             let log_likelihood = |steps: f64| match mean_of(steps) {
-                mean if mean > MAX_MEAN => f64::NEG_INFINITY,
+                mean if mean > settings.max_mean_delay => f64::NEG_INFINITY,
                 mean => Delays::of(mean, lost).blocks(rows).0,
             };
-            mean_of(likeliest(MEANS_PER_E * first.ln(), [FIRST_STEP, 1.0], log_likelihood))
+            mean_of(likeliest(settings.mean_steps_per_e * first.ln(), [settings.first_mean_step, 1.0], log_likelihood))
         };
-        let most = LOST_ROWS.min(t_s.len());
+        let most = settings.lost_rows.min(t_s.len());
         let mean = likeliest_mean(1.0, 0.0, &rows(0.0, most));
-        if mean * (1.0 / MEANS_PER_E).exp() > MAX_MEAN {
+        if mean * (1.0 / settings.mean_steps_per_e).exp() > settings.max_mean_delay {
             return None;
         }
         // Densities are per beat, and beats differ: per second they compare.
         let by_themselves = held_up[..most].iter().filter(|held_up| !**held_up).count() as f64;
         let log_odds = |lost: f64| {
-            let cost = if lost == 0.0 { 0.0 } else { LOST_COST + lost.abs() / USUAL_LOST };
+            let cost = if lost == 0.0 { 0.0 } else { settings.any_lost_cost + lost.abs() / settings.usual_lost };
             Delays::of(mean, lost).blocks(&rows(lost, most)).0 + by_themselves * (1.0 + lost).ln() - cost
         };
-        let is_tried = |steps: &i32| steps.abs() <= MAX_FINE_STEPS || steps % 5 == 0;
-        let shares = (-MAX_LOST_STEPS..=MAX_LOST_STEPS).filter(is_tried).map(|steps| LOST_STEP * f64::from(steps));
+        let is_tried = |steps: &i32| steps.abs() <= settings.max_fine_steps || steps % 5 == 0;
+        let steps = (-settings.max_lost_steps..=settings.max_lost_steps).filter(is_tried);
+        let shares = steps.map(|steps| settings.lost_step * f64::from(steps));
         let lost =
             shares.map(|lost| (lost, log_odds(lost))).max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0.0, |(lost, _)| lost);
-        let lost = likeliest(lost, LOST_STEPS, log_odds);
+        let lost = likeliest(lost, settings.lost_steps, log_odds);
         let (all, period_s) = (rows(lost, t_s.len()), gap_s / (1.0 + lost));
         let mean = likeliest_mean(mean, lost, &rows(lost, most));
         let of_rows = Delays::of(mean, lost).smoothed(&all);
@@ -316,10 +277,11 @@ pub fn has_bunched_rows(t_s: &[f64]) -> bool {
 /// Time from row to row, and which rows came on the heels of the one before; `None` where hardly any did.
 pub(crate) fn rows_on_heels(t_s: &[f64]) -> Option<(f64, Vec<bool>)> {
     let gap_s = slope_s(t_s)?;
-    let is_held_up = |pair: &[f64]| pair[1] - pair[0] < HELD_UP_GAP * gap_s;
+    let most_s = RECEIPT.held_up_gap * gap_s;
+    let is_held_up = |pair: &[f64]| pair[1] - pair[0] < most_s;
     let held_up: Vec<bool> = std::iter::once(false).chain(t_s.windows(2).map(is_held_up)).collect();
     let count = held_up.iter().filter(|held_up| **held_up).count();
-    (count as f64 > MIN_HELD_UP_SHARE * (t_s.len() - 1) as f64).then_some((gap_s, held_up))
+    (count as f64 > RECEIPT.min_held_up_share * (t_s.len() - 1) as f64).then_some((gap_s, held_up))
 }
 
 /// The likeliest value from a first one on, by steps that halve (Hooke & Jeeves 1961).
@@ -338,8 +300,9 @@ fn likeliest(first: f64, [mut step, least_step]: [f64; 2], log_likelihood: impl 
 /// Time from row to row by the lines through the rows between pauses; `None` where there is none.
 fn slope_s(t_s: &[f64]) -> Option<f64> {
     let gap_s = (t_s.last()? - t_s.first()?) / (t_s.len() - 1) as f64;
+    let pause_s = RECEIPT.pause_periods * gap_s;
     let (mut xy, mut xx) = (0.0, 0.0);
-    for part in t_s.chunk_by(|row, next| next - row < PAUSE * gap_s) {
+    for part in t_s.chunk_by(|row, next| next - row < pause_s) {
         let middle = 0.5 * (part.len() - 1) as f64;
         for (row, t_s) in part.iter().enumerate() {
             let x = row as f64 - middle;

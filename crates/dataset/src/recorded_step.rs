@@ -7,12 +7,12 @@
 use std::collections::BTreeSet;
 
 use crate::record::WheelLog;
-use crate::settings::{DECIMAL_TOLERANCE, MAX_DECIMALS, MIN_DISTINCT_RATES};
+use crate::settings::ROUNDED_RATES;
 
 impl WheelLog {
     /// The step that recorded angles, speeds, or speed and yaw rate, are rounded to, rad, m/s or rad/s: one,
     /// two or five in the last decimal that any of them has. `None` for counts, where values have more
-    /// decimals than `MAX_DECIMALS`, and where they are so few that the robot may have driven at these.
+    /// decimals than those of rounded rates, and where they are so few that the robot may have driven at these.
     #[must_use]
     pub fn recorded_step(&self) -> Option<f64> {
         self.decimals().filter(Decimals::are_many).map(|decimals| decimals.step())
@@ -30,8 +30,9 @@ impl WheelLog {
             Self::Ticks(_) => return None,
         };
         let values = || columns.into_iter().flatten().copied();
-        let is_whole = |value: f64| (value - value.round()).abs() <= DECIMAL_TOLERANCE;
-        let per_unit = (0..=MAX_DECIMALS)
+        let tolerance = ROUNDED_RATES.decimal_tolerance;
+        let is_whole = |value: f64| (value - value.round()).abs() <= tolerance;
+        let per_unit = (0..=ROUNDED_RATES.max_decimals)
             .map(|decimals| 10_f64.powi(decimals))
             .find(|of| values().all(|value| is_whole(value * of)))?;
         Some(Decimals { per_unit, numbers: values().map(|value| (value * per_unit).round() as i64).collect() })
@@ -49,7 +50,7 @@ struct Decimals {
 impl Decimals {
     /// Are there more values than speeds that a robot is told to drive at?
     fn are_many(&self) -> bool {
-        self.numbers.len() >= MIN_DISTINCT_RATES
+        self.numbers.len() >= ROUNDED_RATES.min_distinct_rates
     }
 
     /// The step that they are multiples of: one, two or five in their last decimal.

@@ -4,14 +4,7 @@
 //! them. A few are longer by far more: something came in between, and such a length is true.
 
 use crate::order_statistics::{median, quantile};
-
-/// Rows from which on there is a usual length.
-const MIN_ROWS: usize = 24;
-/// Share of the rows whose lengths depart by jitter alone, at the least. The median would not do: lengths
-/// often come in two sorts, of which the more frequent hardly departs.
-const JITTER_SHARE: f64 = 0.9;
-/// Departures beyond so many times that quantile are true: 4.9 standard deviations of normal lengths.
-const MAX_JITTER_RATIO: f64 = 3.0;
+use crate::settings::TIME_BASE;
 
 /// For each row but the first, by how much it is longer than the usual one, seconds. What departs by more
 /// than the others' jitter is true, and its jitter is against the rows that depart by about as much; 0 where
@@ -19,12 +12,13 @@ const MAX_JITTER_RATIO: f64 = 3.0;
 #[must_use]
 pub fn row_jitter_s(t_s: &[f64]) -> Vec<f64> {
     let lengths_s: Vec<f64> = t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let Some(usual_s) = median(lengths_s.iter().copied()).filter(|_| t_s.len() >= MIN_ROWS) else {
+    let Some(usual_s) = median(lengths_s.iter().copied()).filter(|_| t_s.len() >= TIME_BASE.min_rows) else {
         return vec![0.0; lengths_s.len()];
     };
     let departures_s: Vec<f64> = lengths_s.into_iter().map(|length_s| length_s - usual_s).collect();
-    let jitter_s = quantile(departures_s.iter().map(|departure_s| departure_s.abs()), JITTER_SHARE).unwrap_or(0.0);
-    let is_jitter = |departure_s: f64| departure_s.abs() <= MAX_JITTER_RATIO * jitter_s;
+    let sizes_s = departures_s.iter().map(|departure_s| departure_s.abs());
+    let most_s = TIME_BASE.max_jitter_ratio * quantile(sizes_s, TIME_BASE.jitter_quantile).unwrap_or(0.0);
+    let is_jitter = |departure_s: f64| departure_s.abs() <= most_s;
     let long_s: Vec<f64> = departures_s.iter().copied().filter(|departure_s| !is_jitter(*departure_s)).collect();
     let jitter_of = |departure_s: f64| {
         // Rows that are longer by about as much have a usual length of their own.

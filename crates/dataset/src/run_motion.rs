@@ -4,6 +4,7 @@ use kinematics::{DriveGeometry, Increment, Pose, Wheels};
 
 use crate::counter::unwrap;
 use crate::record::{NominalRobot, Odometry, WheelLog};
+use crate::settings::OPPOSITE_WHEELS;
 
 /// The motion over the interval that ends at each row but the first; `None` where the robot is none, or
 /// counts have no resolution.
@@ -84,8 +85,6 @@ pub(crate) struct RunMotion {
 impl RunMotion {
     /// `None` where the robot is none.
     pub(crate) fn of(odometry: &Odometry, robot: &NominalRobot) -> Option<Self> {
-        /// A wheel that stands is none that goes the other way; the margin is that of rounding.
-        const OPPOSITE: f64 = 1.0 + 1e-9;
         let half_base_m = 0.5 * robot.wheel_separation_m;
         let increments = increments(odometry, robot)?;
         let mut motion = Self::default();
@@ -96,7 +95,7 @@ impl RunMotion {
             motion.turning_rad += turn_rad.abs();
             motion.path_m += distance_m.abs();
             course.push((motion.distance_m, motion.turn_rad));
-            if turn_rad.abs() * half_base_m > OPPOSITE * distance_m.abs() {
+            if turn_rad.abs() * half_base_m > OPPOSITE_WHEELS * distance_m.abs() {
                 motion.on_the_spot_rad += turn_rad.abs();
             }
         }

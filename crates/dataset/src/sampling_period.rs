@@ -9,50 +9,12 @@
 
 use rules::Rule;
 
-use crate::lateness::{LINE_ROWS, is_alone, lateness, lateness_of_ticks};
+use crate::lateness::{is_alone, lateness, lateness_of_ticks};
 use crate::order_statistics::median;
 use crate::packets::Packets;
 use crate::receipt_delays::Received;
 use crate::row_numbers::{RowCosts, likeliest_numbers};
-
-/// Rows from which on a log has a beat: the line through so many is off by a fifth of what stamps jitter by.
-const MIN_ROWS: usize = 24;
-/// Rounds in which beat and numbers are found from each other, at the most: each mends what numbers that were
-/// wrong do to the beat.
-const ROUNDS: usize = 5;
-/// Share of the beat by which gaps that are whole numbers of it depart at the most.
-const MAX_WHOLE_GAP_ERROR: f64 = 0.05;
-/// The same where rows came by themselves between them, and stamps are exact: far below what stamps are off
-/// by that were restored from receipt, some tenths of a per mil.
-const MAX_EXACT_GAP_ERROR: f64 = 1e-4;
-/// Share of the sampling period by which a row that came by itself is off the tick that it counts as; one
-/// that is further off came after the tick before it.
-const MAX_OFF_NEXT_TICK: f64 = 0.01;
-/// Share of the rows that came by themselves beside an exact beat at the most: a quarter of what the beat is
-/// told from.
-const MAX_SHARE_BY_THEMSELVES: f64 = 0.25;
-/// Spans of so many rows whose phases say the beat, within these shares of what was known before, and in how
-/// many steps: a fifth of the rows may be lost at first, or have come by themselves; then three times what a
-/// span before leaves open.
-const PHASE_SPANS: [(usize, [f64; 2], u32); 5] = [
-    (2, [0.8, 1.2], 80),
-    (8, [0.97, 1.03], 24),
-    (23, [0.99, 1.01], 20),
-    (100, [0.9975, 1.0025], 20),
-    (400, [0.9994, 1.0006], 20),
-];
-/// A run has as many spans one after the other at the least, so that a beat that begins anew spoils few.
-const SPANS: usize = 8;
-/// Spans of which phases are taken.
-const PHASES_TAKEN: usize = 1000;
-/// Ticks that two beats which number the rows of a log alike are apart at its end: far below the jitter of
-/// any log that is not exact.
-const SAME_BEAT_TICKS: f64 = 0.01;
-/// Where stamps are later than that share of the beat, root mean square, some numbers of rows are wrong.
-const MAX_CERTAIN_LATENESS: f64 = 0.25;
-/// Share of the beat that stamps jitter by, up to which a row that came by itself is told from a late one: by
-/// five standard deviations halfway between ticks.
-const MAX_JITTER_BESIDE: f64 = 0.1;
+use crate::settings::TIME_BASE;
 
 /// The regular beat of a run's rows.
 #[derive(Debug, Clone, PartialEq)]
@@ -74,7 +36,7 @@ pub struct SamplingPeriod {
 impl SamplingPeriod {
     /// The beat of stamps that do not fall; `None` where rows are too few to have one.
     pub(crate) fn of(t_s: &[f64]) -> Option<Self> {
-        if t_s.len() < MIN_ROWS {
+        if t_s.len() < TIME_BASE.min_rows {
             return None;
         }
         let received = Rule::Packets.finds(Self::of_packets(t_s));
@@ -109,8 +71,8 @@ impl SamplingPeriod {
             }
         };
         let mut late_s = found.lateness(t_s);
-        for _ in 0..ROUNDS {
-            if root_mean_square(&late_s) <= MAX_CERTAIN_LATENESS * found.period_s {
+        for _ in 0..TIME_BASE.rounds {
+            if root_mean_square(&late_s) <= TIME_BASE.max_certain_lateness * found.period_s {
                 break;
             }
             // As many rows are lost, or came by themselves, as were found, and not as few as is usual.
@@ -126,7 +88,8 @@ impl SamplingPeriod {
         let off_s = root_mean_square(&late_s);
         // Where stamps jitter by more, rows that share a number need not have come by themselves.
         let of_ticks_s = lateness_of_ticks(&numbers, &late_s);
-        let late_s = if root_mean_square(&of_ticks_s) < MAX_JITTER_BESIDE * period_s { of_ticks_s } else { late_s };
+        let max_jitter_s = TIME_BASE.max_jitter_by_themselves * period_s;
+        let late_s = if root_mean_square(&of_ticks_s) < max_jitter_s { of_ticks_s } else { late_s };
         Some(Self { period_s, numbers, late_s, is_bunched: false, off_s })
     }
 
@@ -138,7 +101,7 @@ impl SamplingPeriod {
     /// Whether stamps are near enough to the beat that the numbers of all rows are right.
     #[must_use]
     pub fn is_certain(&self) -> bool {
-        self.off_s <= MAX_CERTAIN_LATENESS * self.period_s
+        self.off_s <= TIME_BASE.max_certain_lateness * self.period_s
     }
 
     /// Whether no other row has a row's number.
@@ -161,14 +124,15 @@ fn root_mean_square(values: &[f64]) -> f64 {
 /// Beats before numbers are known: the mean gap, as if no row were lost; and the one of which spans of a few
 /// rows, then of more, are whole numbers most nearly (Rayleigh's test of their phases).
 fn first_periods(t_s: &[f64]) -> Option<[f64; 2]> {
-    let span = LINE_ROWS.min(t_s.len() / SPANS);
+    let span = TIME_BASE.line_rows.min(t_s.len() / TIME_BASE.min_spans);
     let mean_s = median(t_s.windows(span + 1).map(|rows| (rows[span] - rows[0]) / span as f64))?;
     if mean_s <= 0.0 {
         return None;
     }
     let mut found_s = mean_s;
-    for (rows, [low, high], steps) in PHASE_SPANS.into_iter().filter(|(rows, ..)| *rows < t_s.len()) {
-        let every = (t_s.len() / PHASES_TAKEN).max(1);
+    let spans = TIME_BASE.phase_span_rows.into_iter().zip(TIME_BASE.phase_span_ratios).zip(TIME_BASE.phase_span_steps);
+    for ((rows, [low, high]), steps) in spans.filter(|((rows, _), _)| *rows < t_s.len()) {
+        let every = (t_s.len() / TIME_BASE.phases_taken).max(1);
         let spans: Vec<f64> = t_s.windows(rows + 1).step_by(every).map(|of| of[rows] - of[0]).collect();
         let agreement = |period_s: f64| -> f64 {
             spans.iter().map(|span_s| kinematics::sin_cos(std::f64::consts::TAU * span_s / period_s).1).sum()
@@ -182,14 +146,14 @@ fn first_periods(t_s: &[f64]) -> Option<[f64; 2]> {
 
 /// The middle one of what long spans say.
 fn period(t_s: &[f64], numbers: &[i64]) -> Option<f64> {
-    let span = LINE_ROWS.min(t_s.len() / SPANS);
+    let span = TIME_BASE.line_rows.min(t_s.len() / TIME_BASE.min_spans);
     let of = |(t_s, numbers): (&[f64], &[i64])| (t_s[span] - t_s[0]) / ((numbers[span] - numbers[0]).max(1) as f64);
     median(t_s.windows(span + 1).zip(numbers.windows(span + 1)).map(of)).filter(|period_s| *period_s > 0.0)
 }
 
 /// Whether two beats are hardly apart at the end of a log: they number its rows alike.
 fn is_same_beat(a_s: f64, b_s: f64, t_s: &[f64]) -> bool {
-    (a_s / b_s - 1.0).abs() * t_s.len() as f64 <= SAME_BEAT_TICKS
+    (a_s / b_s - 1.0).abs() * t_s.len() as f64 <= TIME_BASE.same_period_ticks
 }
 
 /// Rows with their numbers by some beat.
@@ -205,7 +169,7 @@ struct Numbered {
 impl Numbered {
     /// By some idea of the beat, with the beat of these numbers; `None` where it leads nowhere.
     fn by(t_s: &[f64], first_s: f64) -> Option<Self> {
-        Self::with(t_s, first_s, RowCosts::UNKNOWN)
+        Self::with(t_s, first_s, RowCosts::unknown())
     }
 
     /// The same with other costs of rows.
@@ -226,7 +190,7 @@ impl Numbered {
     /// Period and numbers that are found from each other, as long as they get likelier.
     fn settled(self, t_s: &[f64]) -> Self {
         let mut found = self;
-        for _ in 1..ROUNDS {
+        for _ in 1..TIME_BASE.rounds {
             if is_same_beat(found.period_s, found.first_s, t_s) {
                 break;
             }
@@ -248,10 +212,10 @@ fn whole_ticks(gap: f64, max_error: f64) -> Option<i64> {
 
 /// Numbers where every gap is a whole number of beats.
 fn whole_gaps(t_s: &[f64], period_s: f64) -> Option<Vec<i64>> {
-    let mut numbers = vec![0];
-    let mut last = 0;
+    let max_error = TIME_BASE.max_whole_gap_error;
+    let (mut numbers, mut last) = (vec![0], 0);
     for pair in t_s.windows(2) {
-        last += whole_ticks((pair[1] - pair[0]) / period_s, MAX_WHOLE_GAP_ERROR)?;
+        last += whole_ticks((pair[1] - pair[0]) / period_s, max_error)?;
         numbers.push(last);
     }
     Some(numbers)
@@ -263,7 +227,8 @@ fn numbers_beside_rows_of_their_own(t_s: &[f64], period_s: f64) -> Option<Vec<i6
     if period_s <= 0.0 {
         return None;
     }
-    let whole = |gap: f64| whole_ticks(gap, MAX_EXACT_GAP_ERROR);
+    let settings = &*TIME_BASE;
+    let whole = |gap: f64| whole_ticks(gap, settings.max_exact_gap_error);
     let mut numbers = vec![0];
     // The last row of the beat, and its number.
     let (mut last_due_s, mut number, mut by_themselves) = (t_s[0], 0, 0);
@@ -278,14 +243,14 @@ fn numbers_beside_rows_of_their_own(t_s: &[f64], period_s: f64) -> Option<Vec<i6
             numbers.push(number);
         } else {
             // Of the tick before it, or of that which it is next to.
-            let next = (since_due - since_due.round()).abs() <= MAX_OFF_NEXT_TICK;
+            let next = (since_due - since_due.round()).abs() <= settings.max_off_next_tick;
             let ticks = if next { since_due.round() } else { since_due.floor() };
             numbers.push((number + ticks as i64).max(last));
             by_themselves += 1;
         }
     }
-    let is_some = by_themselves > 0 && by_themselves as f64 <= MAX_SHARE_BY_THEMSELVES * t_s.len() as f64;
-    is_some.then_some(numbers)
+    let most = settings.max_share_by_themselves * t_s.len() as f64;
+    (by_themselves > 0 && by_themselves as f64 <= most).then_some(numbers)
 }
 
 #[cfg(test)]

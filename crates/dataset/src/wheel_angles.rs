@@ -10,11 +10,7 @@
 use kinematics::Wheels;
 
 use crate::record::{Dataset, NominalRobot, Run, WheelLog};
-
-/// Counters that read at the starts of two runs what is no farther apart were set back to the same value.
-/// Budgeted: the first row of a log comes some counts after its counter was set to zero; a phase that is off
-/// by 0.1 rad costs half a per cent of an amplitude.
-const SAME_START_RAD: f64 = 0.1;
+use crate::settings::COUNTERS;
 
 /// Follows the counters from run to run, in the order of the session.
 #[derive(Debug, Clone, Default)]
@@ -32,7 +28,7 @@ impl AngleCarrier {
         if let Some([before_start, before_end]) = self.before {
             let is_near = |reading: Wheels<f64>| {
                 let apart = start.zip_with(reading, |start, reading| (start - reading).abs());
-                apart.left.max(apart.right) <= SAME_START_RAD
+                apart.left.max(apart.right) <= COUNTERS.same_start_rad
             };
             if is_near(before_end) {
                 // They went on; what they were set back by before still counts.

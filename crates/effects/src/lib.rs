@@ -23,6 +23,7 @@ mod forward;
 mod hypothesis;
 mod motion_history;
 mod on_board;
+pub mod settings;
 mod stream;
 mod stream_lanes;
 mod term;

@@ -11,7 +11,7 @@
 //! Reference: microcontrollers that restart by their watchdog or for want of voltage; registers that are read
 //! while a driver clears them.
 
-use dataset::{Dataset, WheelLog};
+use dataset::{Dataset, USUAL_COUNTER_BITS, WheelLog};
 use kinematics::{Side, Wheels};
 use serde::{Deserialize, Serialize};
 
@@ -21,6 +21,7 @@ use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
 use crate::hypothesis::{Hypothesis, RecordCorrection, median_of_few, value_of};
 use crate::on_board::OnBoard;
+use crate::settings::{COUNTER_FAULTS, NEIGHBOUR_ROWS};
 use crate::stream::Stream;
 
 /// Counters that are cleared.
@@ -104,22 +105,6 @@ impl Forward for State {
     }
 }
 
-/// Increments to either side of a row whose middle one says how fast the wheel turns.
-const NEIGHBOUR_ROWS: usize = 4;
-/// Rows that read zero one after the other, at most.
-const MAX_ROWS: usize = 2;
-/// A count is far from zero where a wheel does not come back so soon: so many increments of the rows around,
-/// and counts of a wheel that sets off.
-const FAR_INCREMENTS: f64 = 4.0;
-const FAR_COUNTS: f64 = 16.0;
-/// A counter comes back to where it was if it counts no more meanwhile than this share of it; one that counts
-/// on from zero has lost all of it.
-const MAX_COUNTED_SHARE: f64 = 0.5;
-/// Widths of counters whose end is no reset, bits.
-const WRAP_BITS: [u32; 4] = [8, 16, 24, 32];
-/// Rows of zero that make the log itself show the fault: one may be a row of another device.
-const MIN_VISIBLE_ROWS: usize = 2;
-
 /// Increments of a column, and the rate around each.
 struct Rates<'c> {
     t_s: &'c [f64],
@@ -158,7 +143,7 @@ impl<'c> Rates<'c> {
 
 /// What a wheel counts over a stretch at the most, by what is due.
 fn far(due: f64) -> f64 {
-    FAR_INCREMENTS * due.abs() + FAR_COUNTS
+    COUNTER_FAULTS.far_increments * due.abs() + COUNTER_FAULTS.far_counts
 }
 
 /// Puts rows that read zero for a moment between their neighbours, and says how many there were.
@@ -168,7 +153,7 @@ fn fill_zero_rows(t_s: &[f64], ticks: &mut [i64]) -> usize {
     while row < ticks.len() {
         let before = row - 1;
         let end = (row..ticks.len()).find(|k| ticks[*k] != 0).unwrap_or(ticks.len());
-        let is_zero = (1..=MAX_ROWS).contains(&(end - row));
+        let is_zero = (1..=COUNTER_FAULTS.max_fault_rows).contains(&(end - row));
         if !is_zero || (ticks[before] as f64).abs() <= far(rates.due(before, row)) {
             row += 1;
             continue;
@@ -180,7 +165,7 @@ fn fill_zero_rows(t_s: &[f64], ticks: &mut [i64]) -> usize {
         };
         let last = end.min(ticks.len() - 1);
         let (from, passed_s) = (ticks[before], t_s[last] - t_s[before]);
-        if counted.abs() <= MAX_COUNTED_SHARE * (from as f64).abs() && passed_s > 0.0 {
+        if counted.abs() <= COUNTER_FAULTS.max_counted_share * (from as f64).abs() && passed_s > 0.0 {
             for k in row..end {
                 ticks[k] = from + (counted * (t_s[k] - t_s[before]) / passed_s).round() as i64;
                 restored += 1;
@@ -202,8 +187,9 @@ fn reset_of(shown: &[i64], rates: &Rates<'_>, row: usize) -> Option<f64> {
     }
     let due = rates.due(row - 1, row);
     let off = (rates.increments[row - 1] - due).abs();
-    let wraps = |bits: &u32| (off - 2_f64.powi(*bits as i32)).abs() <= 2.0 * due.abs() + FAR_COUNTS;
-    (off > most && !WRAP_BITS.iter().any(wraps)).then_some(due)
+    let most_off = 2.0 * due.abs() + COUNTER_FAULTS.far_counts;
+    let wraps = |bits: &u8| (off - 2_f64.powi(i32::from(*bits))).abs() <= most_off;
+    (off > most && !USUAL_COUNTER_BITS.iter().any(wraps)).then_some(due)
 }
 
 /// Carries the counts on where they begin again at zero, and says how often they did.
@@ -244,7 +230,7 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
                 ("persistent", f64::from(u8::from(persistent))),
             ],
             sentence,
-            visible_in_log: persistent || found >= MIN_VISIBLE_ROWS,
+            visible_in_log: persistent || found >= COUNTER_FAULTS.min_visible_faults,
             mistakes: 1,
             records,
         })

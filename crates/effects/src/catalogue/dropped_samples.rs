@@ -23,6 +23,7 @@ use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
 use crate::hypothesis::{Hypothesis, RecordCorrection, value_of};
 use crate::on_board::OnBoard;
+use crate::settings::GAPS;
 use crate::stream::Stream;
 
 /// Rows lost with their counts.
@@ -95,9 +96,6 @@ impl Forward for State {
     }
 }
 
-/// Share of the pairs of successive measurements that gaps may spoil for the rest to be enough.
-const MAX_SPOILED_PAIRS: f64 = 0.5;
-
 /// Share of the pairs of successive measurements of some runs whose motion the counts leave open.
 fn spoiled_pairs(runs: &[Run]) -> f64 {
     let (mut spoiled, mut pairs) = (0.0, 0.0);
@@ -168,7 +166,7 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
         missing_rows += fill(run, gaps, short);
         rows += run.odometry.t_s.len() as f64;
     }
-    if spoiled_pairs(&records.runs) > MAX_SPOILED_PAIRS {
+    if spoiled_pairs(&records.runs) > GAPS.max_spoiled_pairs {
         for (run, recorded) in records.runs.iter_mut().zip(&dataset.runs) {
             run.unknown_motion.clone_from(&recorded.unknown_motion);
         }

@@ -24,6 +24,7 @@ use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, SampleClock};
 use crate::hypothesis::{Hypothesis, Variant, value_of};
 use crate::on_board::{Code, OnBoard};
+use crate::settings::INTERVALS;
 use crate::stream::Stream;
 
 /// The mean term in C, for a robot's own odometry.
@@ -53,10 +54,6 @@ impl IntervalError {
     /// irregularity.
     pub(crate) const TYPICAL_JITTER_S: f64 = 0.005;
 }
-
-/// A fit may find so much of the irregularity to be false, where there is no more of it than all: the beat is
-/// known from the same stamps, and delays of several rows together are taken for the clock's.
-const MAX_FOUND_SHARE: f64 = 1.5;
 
 impl PhysicalEffect for IntervalError {
     fn check(&self) -> Result<(), EffectError> {
@@ -92,7 +89,7 @@ impl PhysicalEffect for IntervalError {
 
     /// A share that was found a little beyond all of it is all of it.
     fn from_estimates(values: &[(&str, f64)]) -> Option<Self> {
-        let share = value_of(values, "share").filter(|share| share.abs() <= MAX_FOUND_SHARE)?;
+        let share = value_of(values, "share").filter(|share| share.abs() <= INTERVALS.max_found_share)?;
         Some(Self {
             share: share.clamp(-1.0, 1.0),
             jitter_s: value_of(values, "jitter_s").unwrap_or(Self::TYPICAL_JITTER_S),
@@ -113,13 +110,6 @@ impl PhysicalEffect for IntervalError {
         (robot.jitter_s > 0.0).then_some(Self { share: 0.0, jitter_s: robot.jitter_s })
     }
 }
-
-/// Standard deviations within which an estimated share is held to be all of it: a timer reads, and the stamp
-/// has nothing of it.
-const WHOLE_SHARE_SIGMAS: f64 = 3.0;
-
-/// Share of the beat that rows are apart at the least: what rounded stamps of a file leave.
-const MIN_GAP: f64 = 1e-3;
 
 /// The records of counts or angles whose stamps are as late as the readings were. `None` where the share is
 /// not positive, or no run has a beat.
@@ -146,7 +136,7 @@ fn read_times(stamps_s: &Timestamps, share: f64, sigma: f64) -> Option<(Vec<f64>
     if share <= 0.0 {
         return None;
     }
-    let share = if (share - 1.0).abs() <= WHOLE_SHARE_SIGMAS * sigma { 1.0 } else { share.min(1.0) };
+    let share = if (share - 1.0).abs() <= INTERVALS.whole_share_sigmas * sigma { 1.0 } else { share.min(1.0) };
     let period = stamps_s.sampling_period()?;
     let is_certain = period.is_certain();
     let mut says: Vec<bool> = (0..stamps_s.len()).map(|row| is_certain || period.is_alone(row)).collect();
@@ -154,7 +144,7 @@ fn read_times(stamps_s: &Timestamps, share: f64, sigma: f64) -> Option<(Vec<f64>
     let last = says.len() - 1;
     (says[0], says[last]) = (true, true);
     // Rows keep their order.
-    let least_s = MIN_GAP * period.period_s;
+    let least_s = INTERVALS.min_gap * period.period_s;
     let mut before_s = f64::NEG_INFINITY;
     let read = |(stamp_s, late_s): (&f64, &f64)| {
         before_s = f64::max(before_s + least_s, stamp_s - share * late_s);
@@ -162,14 +152,6 @@ fn read_times(stamps_s: &Timestamps, share: f64, sigma: f64) -> Option<(Vec<f64>
     };
     Some((stamps_s.iter().zip(&period.late_s).map(read).collect(), says))
 }
-
-/// Rows to either side whose counts say how fast a wheel turns, at the least; further ones where stamps are
-/// late by more beats, for which these are few.
-const RATE_ROWS: usize = 10;
-/// Times by which a row counts more than the middle one at the most: a counter that wraps counts otherwise.
-const MAX_COUNT_RATIO: f64 = 20.0;
-/// A share is known by counts to no better: the beat is found from the same stamps.
-const MIN_SHARE_SIGMA: f64 = 0.05;
 
 /// The share by what is counted in rows that hold up each other: a row that comes on the heels of another has
 /// counted a whole beat if it was read on the beat, and next to nothing if it was read when it was stamped.
@@ -193,7 +175,7 @@ fn share_by_counts(datasets: &[Dataset]) -> Option<(f64, f64)> {
     let share = xy / xx;
     let left = rows.iter().map(|(x, y)| (y - share * x).powi(2)).sum::<f64>() / rows.len() as f64;
     let sigma = (left / xx).sqrt();
-    (share.is_finite() && sigma.is_finite()).then(|| (share, sigma.max(MIN_SHARE_SIGMA)))
+    (share.is_finite() && sigma.is_finite()).then(|| (share, sigma.max(INTERVALS.min_share_sigma)))
 }
 
 /// For each row, by how much its count on the beat would exceed its count at its stamp, and by how much the
@@ -206,9 +188,9 @@ fn counted_rows<'r>(
 ) -> impl Iterator<Item = (f64, f64)> + 'r {
     let late_s2 = stamps_s.iter().zip(read_s).map(|(stamp_s, read_s)| (stamp_s - read_s).powi(2)).sum::<f64>();
     let late = (late_s2 / stamps_s.len() as f64).sqrt() / period_s;
-    let extent = RATE_ROWS.max((4.0 * late) as usize);
+    let extent = INTERVALS.rate_rows.max((4.0 * late) as usize);
     let usual = median(counts.windows(2).map(|pair| (pair[1] - pair[0]).abs()));
-    let most = usual.map_or(0.0, |usual| MAX_COUNT_RATIO * usual);
+    let most = usual.map_or(0.0, |usual| INTERVALS.max_count_ratio * usual);
     (extent + 1..stamps_s.len().saturating_sub(extent)).filter_map(move |row| {
         let (from, to) = (row - 1 - extent, row + extent);
         let rate = (counts[to] - counts[from]) / (read_s[to] - read_s[from]);

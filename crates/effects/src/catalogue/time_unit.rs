@@ -16,12 +16,10 @@ use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, SampleClock};
 use crate::hypothesis::{Hypothesis, RecordCorrection, value_of};
 use crate::on_board::{Correction, OnBoard, RawInterval};
+use crate::settings;
 
 /// Factors between units of time that people use.
 const FACTORS: [f64; 6] = [1e3, 1e6, 1e9, 1e-3, 1e-6, 1e-9];
-
-/// How far from a factor a ratio of two spans may be: measurements need not begin and end with the log.
-const MAX_SPAN_RATIO: f64 = 4.0;
 
 /// What a robot's own odometry does first.
 const ON_BOARD: OnBoard = OnBoard::Constant(Correction {
@@ -87,9 +85,6 @@ fn span_ratio(dataset: &Dataset) -> Option<f64> {
     median(dataset.runs.iter().filter_map(ratio))
 }
 
-/// Speed of a usual robot, m/s.
-const TYPICAL_SPEED_M_S: f64 = 0.3;
-
 /// How far, in logarithms, the robot's mean speed by its log is from a usual robot's.
 fn off_typical(dataset: &Dataset) -> f64 {
     let session = dataset.session();
@@ -103,12 +98,17 @@ fn off_typical(dataset: &Dataset) -> f64 {
         distance_m += run.rolled_m(session.robot);
         time_s += t_s.last().zip(t_s.first()).map_or(0.0, |(last, first)| last - first);
     }
-    if distance_m > 0.0 && time_s > 0.0 { (distance_m / time_s / TYPICAL_SPEED_M_S).ln().abs() } else { 0.0 }
+    if distance_m > 0.0 && time_s > 0.0 {
+        (distance_m / time_s / settings::FACTORS.usual_speed_m_s).ln().abs()
+    } else {
+        0.0
+    }
 }
 
 fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
     let Some(ratio) = span_ratio(dataset) else { return Vec::new() };
-    let near = |factor: &f64| ratio / factor < MAX_SPAN_RATIO && factor / ratio < MAX_SPAN_RATIO;
+    let most = settings::FACTORS.max_span_ratio;
+    let near = |factor: &f64| ratio / factor < most && factor / ratio < most;
     let Some(factor) = FACTORS.into_iter().find(near) else { return Vec::new() };
     let (mut log, mut measurements) = (dataset.clone(), dataset.clone());
     for run in &mut log.runs {

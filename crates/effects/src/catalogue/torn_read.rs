@@ -19,6 +19,7 @@ use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
 use crate::hypothesis::{Hypothesis, RecordCorrection, median_of_few, value_of};
 use crate::on_board::OnBoard;
+use crate::settings::{COUNTER_FAULTS, NEIGHBOUR_ROWS};
 use crate::stream::Stream;
 
 /// Steps of torn bytes, counts.
@@ -95,12 +96,6 @@ impl Forward for State {
     }
 }
 
-/// Increments around one by which it is judged, on each side: torn samples spoil two each, and the median
-/// stands most of them.
-const NEIGHBOUR_ROWS: usize = 4;
-/// Rows that are torn one after the other, at most.
-const MAX_ROWS: usize = 2;
-
 /// Puts back the samples of a column that are outlying jumps, and says how many these were. Increments that
 /// are usually an eighth of a jump out of line with their neighbours, and jumps that are not undone, are none
 /// of this fault.
@@ -151,7 +146,9 @@ fn mend(t_s: &[f64], ticks: &mut [i64], jump: i64) -> Restored {
         used = at;
     }
     // A byte that is torn leaves just its step; what jumps by about as much is something else.
-    if median(misses).is_some_and(|miss| miss > MAX_MISS_RATIO * usual.max(MIN_MISS_COUNTS)) {
+    if median(misses)
+        .is_some_and(|miss| miss > COUNTER_FAULTS.max_miss_ratio * usual.max(COUNTER_FAULTS.min_miss_counts))
+    {
         ticks.copy_from_slice(&as_read);
         return Restored::default();
     }
@@ -174,18 +171,8 @@ fn mend(t_s: &[f64], ticks: &mut [i64], jump: i64) -> Restored {
             }
         }
     }
-    Restored { samples: restored, clear: if usual < step / CLEAR_JUMP_RATIO { restored } else { 0 } }
+    Restored { samples: restored, clear: if usual < step / COUNTER_FAULTS.clear_jump_ratio { restored } else { 0 } }
 }
-
-/// Torn samples miss the step of a byte by what increments are out of line usually, and by so many times that
-/// for half of them at the most: tears come in ramps as well.
-const MAX_MISS_RATIO: f64 = 8.0;
-/// Increments are out of line by as much usually at the least, counts: rounding.
-const MIN_MISS_COUNTS: f64 = 1.0;
-
-/// A usual increment is out of line by less than this part of a jump where jumps are plain: stamps that
-/// jitter make some that measurement alike.
-const CLEAR_JUMP_RATIO: f64 = 64.0;
 
 /// Samples put back.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -225,7 +212,7 @@ fn undone(jumps: &[f64]) -> Option<usize> {
     if outlying.abs() != 1.0 {
         return None;
     }
-    for (rows, jumps) in jumps.iter().enumerate().skip(1).take(MAX_ROWS) {
+    for (rows, jumps) in jumps.iter().enumerate().skip(1).take(COUNTER_FAULTS.max_fault_rows) {
         outlying += jumps;
         if outlying == 0.0 {
             return Some(rows);
@@ -236,9 +223,6 @@ fn undone(jumps: &[f64]) -> Option<usize> {
     }
     None
 }
-
-/// Jumps of just a torn byte that are undone at once: one may be an accident, two are none.
-const MIN_VISIBLE_FAULTS: usize = 2;
 
 fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
     let without = |jump: i64| {
@@ -257,7 +241,7 @@ fn corrections(dataset: &Dataset) -> Vec<RecordCorrection> {
         (restored > 0).then(|| RecordCorrection {
             values: vec![("probability", restored as f64 / samples as f64), ("jump_counts", jump as f64)],
             sentence: format!("{restored} counts were torn while they were read, off by {jump}"),
-            visible_in_log: clear >= MIN_VISIBLE_FAULTS,
+            visible_in_log: clear >= COUNTER_FAULTS.min_visible_faults,
             mistakes: 1,
             records,
         })

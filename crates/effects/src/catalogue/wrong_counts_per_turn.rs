@@ -19,6 +19,7 @@ use crate::effect::{EffectError, PhysicalEffect};
 use crate::forward::{Forward, Hooks, Readout};
 use crate::hypothesis::{Hypothesis, RecordCorrection, rewrite_wheels, value_of};
 use crate::on_board::{Correction, OnBoard, RawInterval};
+use crate::settings;
 
 /// Factors by which people err.
 const FACTORS: [(f64, &str); 14] = [
@@ -37,19 +38,6 @@ const FACTORS: [(f64, &str); 14] = [
     (1000.0, "millimetres for metres"),
     (0.001, "metres for millimetres"),
 ];
-
-/// How near an estimate must come to a factor of the list, as a share: wheels are out by less, and the list
-/// is not that dense.
-const FACTOR_TOLERANCE: f64 = 0.12;
-
-/// Nearer to one than this share is no gross fault.
-const MIN_DEPARTURE: f64 = 0.3;
-
-/// Shortest distance that is compared, metres, and shortest turn, radians: far above what instruments err.
-const MIN_COMPARED_MOTION: [f64; 2] = [0.2, 0.5];
-
-/// A displacement goes on where the one before ended, by the rounding of a file.
-const SAME_INSTANT_S: f64 = 1e-6;
 
 /// What a robot's own odometry does first.
 const ON_BOARD: OnBoard = OnBoard::Constant(Correction {
@@ -150,7 +138,7 @@ fn ratios(dataset: &Dataset, run: &RunView<'_>) -> Option<[Vec<f64>; 2]> {
                 };
                 let moved =
                     [(pose.x_m - anchor.x_m).hypot(pose.y_m - anchor.y_m), (pose.theta_rad - anchor.theta_rad).abs()];
-                if moved[k] > MIN_COMPARED_MOTION[k] {
+                if moved[k] > settings::FACTORS.min_compared_motion[k] {
                     found[k].push((counted[k] - start[k]).abs() / moved[k]);
                     anchors[k] = Some((pose, counted));
                 }
@@ -168,7 +156,7 @@ fn measured_poses(run: &RunView<'_>) -> Vec<Vec<(f64, Pose)>> {
         return vec![run.observed_poses()];
     }
     displacements
-        .chunk_by(|before, after| (after.t0_s - before.t1_s).abs() <= SAME_INSTANT_S)
+        .chunk_by(|before, after| (after.t0_s - before.t1_s).abs() <= settings::FACTORS.same_instant_s)
         .map(|stretch| {
             let mut poses: Vec<(f64, Pose)> =
                 stretch.first().map(|first| (first.t0_s, Pose::IDENTITY)).into_iter().collect();
@@ -192,12 +180,8 @@ fn estimate(dataset: &Dataset) -> Option<f64> {
     }
     let [distances, turns] = all.map(median);
     let factor = distances.or(turns).filter(|factor| *factor > 0.0 && factor.is_finite())?;
-    (factor.ln().abs() > MIN_DEPARTURE.ln_1p()).then_some(factor)
+    (factor.ln().abs() > settings::FACTORS.min_departure.ln_1p()).then_some(factor)
 }
-
-/// With fewer measurements a run, what lies between two of them is no distance that could be measured: paths
-/// turn, and may lead back.
-const MIN_MEASUREMENTS: usize = 4;
 
 /// Whether the runs are measured at their ends alone.
 fn is_measured_at_ends(dataset: &Dataset) -> bool {
@@ -209,7 +193,7 @@ fn is_measured_at_ends(dataset: &Dataset) -> bool {
         .map(measurements)
         .filter(|measurements| *measurements > 0)
         .fold((0, 0), |(runs, all), own| (runs + 1, all + own));
-    measurements < MIN_MEASUREMENTS * runs
+    measurements < settings::FACTORS.min_measurements * runs
 }
 
 /// The factors that may be: that of the distances that were measured and, where hardly any was, all that
@@ -218,7 +202,10 @@ fn factors(dataset: &Dataset) -> Vec<(f64, &'static str)> {
     let of_distances = estimate(dataset).map(|estimate| {
         let off = |factor: f64| (estimate / factor).ln().abs();
         let nearest = FACTORS.iter().min_by(|a, b| off(a.0).total_cmp(&off(b.0)));
-        nearest.filter(|(factor, _)| off(*factor) < FACTOR_TOLERANCE).copied().unwrap_or((estimate, "a gear?"))
+        nearest
+            .filter(|(factor, _)| off(*factor) < settings::FACTORS.factor_tolerance)
+            .copied()
+            .unwrap_or((estimate, "a gear?"))
     });
     let all = if is_measured_at_ends(dataset) { &FACTORS[..] } else { &[] };
     let others = all.iter().copied().filter(|known| Some(*known) != of_distances);

@@ -6,31 +6,10 @@ use std::ops::Range;
 use dataset::{Odometry, Run, Timestamps, WheelLog, median};
 use kinematics::{Side, Wheels};
 
-/// Where rows are too few to have a beat: an interval longer than the usual one by this factor is nearer to
-/// two of them. It may be a gap, or a pause of the log, and the counts tell.
-const GAP_RATIO: f64 = 1.5;
-/// Share of the most counts of a row that one that was held up beside it shows at the least. One that came by
-/// itself shows what its length says: anything.
-const MIN_WHOLE_ROW: f64 = 0.75;
-/// Rows to either side of a gap among which those are that it holds up.
-const HELD_UP_ROWS: usize = 4;
-/// Counts that what both wheels show, over a row or a gap, may be off by as they are rounded: one of each.
-const MAX_ROUNDING: f64 = 2.0;
+use crate::settings::GAPS;
+
 /// Variance of a difference of two counts that are each rounded, counts².
 const ROUNDING_VARIANCE: f64 = 1.0 / 6.0;
-/// Rows to either side of a gap that say how fast the wheels turned: their rounding is a third of a row's.
-const ROWS_AROUND: usize = 3;
-/// Where so many times as many gaps lost counts as did not, all did: those that did not are mistakes.
-const ALL_LOST_RATIO: usize = 4;
-/// With so many gaps that lost counts, the log itself shows the fault.
-const MIN_VISIBLE_FAULTS: usize = 3;
-/// Share of the gaps that are taken for such that lost their counts and did not, at the most: four times what
-/// logs show whose counters go on.
-const MAX_MISJUDGED_SHARE: f64 = 0.1;
-/// Wheels of gaps from which on they tell together, and by how many standard errors of a share that is nearer
-/// to all than to none: by chance in three logs of a thousand.
-const MIN_TOGETHER: usize = 20;
-const TOGETHER_SIGMAS: f64 = 3.0;
 
 /// What the gaps of some runs say.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -80,13 +59,13 @@ impl LostShare {
 
     /// Whether they lost their counts; `None` where they are too few to tell, or some did and some did not.
     fn are_lost(&self) -> Option<bool> {
-        if self.gaps < MIN_TOGETHER || self.mm <= 0.0 {
+        if self.gaps < GAPS.min_wheels_together || self.mm <= 0.0 {
             return None;
         }
         let share = self.mx / self.mm;
         let [xx, xm, mm] = self.scatter;
         let sigma = (xx - 2.0 * share * xm + share * share * mm).max(0.0).sqrt() / self.mm;
-        let is_near = |of: f64| (share - of).abs() + TOGETHER_SIGMAS * sigma < 0.5;
+        let is_near = |of: f64| (share - of).abs() + GAPS.together_sigmas * sigma < 0.5;
         if is_near(1.0) {
             Some(true)
         } else if is_near(0.0) {
@@ -127,12 +106,12 @@ impl Missing {
 
     /// Whether more gaps lost their counts than are misjudged.
     fn some_lost(&self) -> bool {
-        self.lost as f64 > MAX_MISJUDGED_SHARE * (self.lost + self.kept) as f64
+        self.lost as f64 > GAPS.max_misjudged_share * (self.lost + self.kept) as f64
     }
 
     /// Whether the log itself shows the fault.
     pub(super) fn is_visible(&self) -> bool {
-        let by_some = self.lost >= MIN_VISIBLE_FAULTS && self.some_lost();
+        let by_some = self.lost >= GAPS.min_visible_gaps && self.some_lost();
         (by_some || self.all_lost_together()) && !self.uncertain
     }
 
@@ -144,7 +123,7 @@ impl Missing {
         } else if self.uncertain || self.is_bunched {
             // Where numbers of rows are wrong, or a row was held up, one that does not tell may be none.
             ShortGaps::Unknown
-        } else if self.lost > ALL_LOST_RATIO * self.kept {
+        } else if self.lost > GAPS.all_lost_ratio * self.kept {
             ShortGaps::Lost
         } else {
             ShortGaps::Either
@@ -162,9 +141,10 @@ fn rows_after(t_s: &Timestamps) -> Option<(Vec<f64>, bool)> {
     }
     let lengths_s: Vec<f64> = t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let usual_s = median(lengths_s.clone()).filter(|usual_s| *usual_s > 0.0)?;
+    let gap_ratio = GAPS.gap_ratio;
     let rows = |length_s: &f64| match length_s / usual_s {
-        ratio if ratio > GAP_RATIO => ratio,
-        ratio if ratio * GAP_RATIO < 1.0 => 0.0,
+        ratio if ratio > gap_ratio => ratio,
+        ratio if ratio * gap_ratio < 1.0 => 0.0,
         _ => 1.0,
     };
     Some((lengths_s.iter().map(rows).collect(), false))
@@ -224,8 +204,9 @@ fn judged(rows: f64, length_s: f64, shown: f64, beside: [Beside; 2]) -> GapJudge
     let (evenly, said) = (range(beside.map(|row| row.counts)), range(as_long_as_said));
     let (least, most) = (f64::min(evenly.0, said.0), f64::max(evenly.1, said.1));
     // What the gap shows at the least where it kept its counts, and at the most where it lost them.
-    let least_kept = rows * (least - MAX_ROUNDING) - MAX_ROUNDING;
-    let most_lost = most + 2.0 * MAX_ROUNDING;
+    let rounding = GAPS.max_rounding_counts;
+    let least_kept = rows * (least - rounding) - rounding;
+    let most_lost = most + 2.0 * rounding;
     let likely_lost = shown < 0.25 * (1.0 + rows) * (least + most);
     let is_lost = match (shown >= least_kept, shown <= most_lost) {
         (true, true) => None,
@@ -260,17 +241,18 @@ fn holds_rows_up(gap: usize, rows: &[f64], shown: &Wheels<Vec<f64>>) -> bool {
     let counts = |row: usize| shown.left[row].abs() + shown.right[row].abs();
     let are_whole = |near: &Range<usize>| {
         let most = near.clone().map(counts).fold(0.0, f64::max);
-        near.clone().all(|row| counts(row) >= MIN_WHOLE_ROW * most)
+        near.clone().all(|row| counts(row) >= GAPS.min_whole_row * most)
     };
     let is_even = |near: &Range<usize>| rows[near.clone()].iter().sum::<f64>() <= near.len() as f64;
-    let ends = gap + 1..=(gap + 1 + HELD_UP_ROWS).min(rows.len());
-    let mut near = ends.flat_map(|end| (gap.saturating_sub(HELD_UP_ROWS)..=gap).rev().map(move |first| first..end));
+    let held_up_rows = GAPS.held_up_rows;
+    let ends = gap + 1..=(gap + 1 + held_up_rows).min(rows.len());
+    let mut near = ends.flat_map(|end| (gap.saturating_sub(held_up_rows)..=gap).rev().map(move |first| first..end));
     near.any(|near| is_even(&near) && are_whole(&near))
 }
 
 /// The gaps of a run over which its wheels turned, and what they say of missing rows.
 pub(super) fn gaps(run: &Run) -> (Vec<Gap>, Missing) {
-    let mut missing = Missing::default();
+    let (mut missing, rows_around) = (Missing::default(), GAPS.rows_around);
     let Odometry { t_s, wheels: WheelLog::Ticks(ticks), .. } = &run.odometry else { return (Vec::new(), missing) };
     let Some((rows, uncertain)) = rows_after(t_s) else { return (Vec::new(), missing) };
     missing.uncertain = uncertain;
@@ -280,10 +262,10 @@ pub(super) fn gaps(run: &Run) -> (Vec<Gap>, Missing) {
     let is_row = |k: &usize| rows[*k] == 1.0;
     let mut found = Vec::new();
     for (k, &of_gap) in rows.iter().enumerate().filter(|(_, of_gap)| **of_gap > 1.0) {
-        let before: Vec<usize> = (0..k).rev().filter(is_row).take(ROWS_AROUND).collect();
-        let after: Vec<usize> = (k + 1..rows.len()).filter(is_row).take(ROWS_AROUND).collect();
+        let before: Vec<usize> = (0..k).rev().filter(is_row).take(rows_around).collect();
+        let after: Vec<usize> = (k + 1..rows.len()).filter(is_row).take(rows_around).collect();
         let of_each = match before.len().min(after.len()) {
-            0 => ROWS_AROUND,
+            0 => rows_around,
             of_each => of_each,
         };
         let sides = [&before[..of_each.min(before.len())], &after[..of_each.min(after.len())]];
