@@ -12,7 +12,7 @@ use crate::settings::ROUNDED_RATES;
 impl WheelLog {
     /// The step that recorded angles, speeds, or speed and yaw rate, are rounded to, rad, m/s or rad/s: one,
     /// two or five in the last decimal that any of them has. `None` for counts, where values have more
-    /// decimals than those of rounded rates, and where they are so few that the robot may have driven at these.
+    /// decimals than rounded ones, and where they are so few that the robot may have driven at these.
     #[must_use]
     pub fn recorded_step(&self) -> Option<f64> {
         self.decimals().filter(Decimals::are_many).map(|decimals| decimals.step())
