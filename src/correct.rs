@@ -80,7 +80,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
             let why = "two datasets have folders of this name; correct them one by one";
             return Err(format!("{}: {why}", path.display()).into());
         }
-        datasets.push(correct(path, &inside, &calibration, (out, &mut files), terminal)?);
+        datasets.push(correct(path, &inside, &calibration, out, &mut files, terminal)?);
     }
     for file in &files.written {
         let target = out.join(file);
@@ -131,7 +131,8 @@ fn correct(
     path: &Path,
     inside: &Path,
     calibration: &GivenCalibration,
-    (out, files): (&Path, &mut Files<'_>),
+    out: &Path,
+    files: &mut Files<'_>,
     terminal: &Terminal,
 ) -> Result<CorrectedDataset, Failure> {
     let warn = |warnings: &[Warning]| warn(path, warnings, terminal);

@@ -114,7 +114,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
 
     let mut datasets = vec![first];
     let mut given = vec![path("robot")];
-    let mut diagnosis = diagnosed(&datasets, &given, (&path("diagnosis"), arguments.force), terminal)
+    let mut diagnosis = diagnosed(&datasets, &given, &path("diagnosis"), arguments.force, terminal)
         .map_err(|why| format!("{} was hidden, and it cannot be diagnosed: {why}", hidden.id))?;
     terminal.say(&format!("2. Calibration and diagnosis: {}.", diagnosis.document.sentence))?;
     tell(&diagnosis, terminal)?;
@@ -133,7 +133,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
             given.push(path(&name));
         }
         terminal.say(&format!("4. The robot drives what the diagnosis asks for: {}.", next.drive))?;
-        match diagnosed(&datasets, &given, (&path("diagnosis-after-plan"), arguments.force), terminal) {
+        match diagnosed(&datasets, &given, &path("diagnosis-after-plan"), arguments.force, terminal) {
             Ok(after) => {
                 diagnosis = after;
                 report = path("diagnosis-after-plan").join("report.html");
@@ -276,12 +276,13 @@ fn drawn(id: &'static str, robot: &Scenario, draws: Address) -> Result<Hidden, &
 fn diagnosed(
     datasets: &[Dataset],
     given: &[PathBuf],
-    (out, force): (&Path, bool),
+    out: &Path,
+    force: bool,
     terminal: &Terminal,
 ) -> Result<Diagnosis, Failure> {
     terminal.remark(&format!("diagnosing {} runs", datasets.iter().map(|of| of.runs.len()).sum::<usize>()));
     let mut diagnosis = ::diagnose::diagnose(datasets, &Options::default())?;
-    write_diagnosis(&mut diagnosis, datasets, given, (out, force))?;
+    write_diagnosis(&mut diagnosis, datasets, given, out, force)?;
     Ok(diagnosis)
 }
 

@@ -70,7 +70,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> Result<ExitCode
         }
     }
     if let Some(out) = &arguments.out {
-        write_diagnosis(&mut diagnosis, log.datasets(), &arguments.datasets, (out, arguments.force))?;
+        write_diagnosis(&mut diagnosis, log.datasets(), &arguments.datasets, out, arguments.force)?;
         terminal.remark(&format!(
             "findings in {}; report.html is to be looked at, report.md has the same text",
             out.display()
@@ -95,7 +95,8 @@ pub(crate) fn write_diagnosis(
     diagnosis: &mut Diagnosis,
     datasets: &[Dataset],
     given: &[PathBuf],
-    (out, force): (&Path, bool),
+    out: &Path,
+    force: bool,
 ) -> Result<(), Failure> {
     write_folder(out, force, |folder| {
         if let Ok(scenario) = &diagnosis.extended {

@@ -82,7 +82,7 @@ fn of_dataset(
     let options_of = EvaluationOptions::default();
     let nominal = evaluate_runs(&raw, None, &options_of, &mut 0.0);
     let offline = evaluate_runs(&records, Some(given.calibration()), &options_of, &mut 0.0);
-    let on_board = |is_logged: bool| on_board(robot, &given, (&dataset, &records), options, is_logged);
+    let on_board = |is_logged: bool| on_board(robot, &given, &dataset, &records, options, is_logged);
     let summary = |runs| CalibrationDrift::of_runs(None, runs);
     let logged = summary(on_board(true)?);
     let untold = robot.needs_inputs().then(|| on_board(false)).transpose()?.map(summary);
@@ -99,7 +99,8 @@ fn of_dataset(
 fn on_board(
     robot: &CalibratedRobot,
     given: &GivenCalibration,
-    (dataset, records): (&Dataset, &Session<'_>),
+    dataset: &Dataset,
+    records: &Session<'_>,
     options: &Options,
     is_logged: bool,
 ) -> Result<Vec<RunDrift>, Failure> {

@@ -86,7 +86,8 @@ struct OfScenario {
 /// What other instruments would leave of ± of a robot, in a room and a time.
 fn instruments(
     robot: &Scenario,
-    (room_m, minutes): ([f64; 2], f64),
+    room_m: [f64; 2],
+    minutes: f64,
     terminal: &Terminal,
 ) -> Result<Vec<Expected>, Failure> {
     let own = robot.budget;
@@ -141,7 +142,7 @@ fn of_data(
         Some(next) => {
             show(next, terminal)?;
             if let (Some(room_m), Ok(robot)) = (arguments.room, &extended) {
-                of_instruments = instruments(robot, (room_m, arguments.minutes.unwrap_or(MINUTES)), terminal)?;
+                of_instruments = instruments(robot, room_m, arguments.minutes.unwrap_or(MINUTES), terminal)?;
             }
             if let Some(out) = &arguments.out {
                 let scenario = extended.map_err(|why| format!("{}: no plan.toml: {why}", out.display()))?;
@@ -150,7 +151,8 @@ fn of_data(
                 write_plan(
                     &names.collect::<Vec<_>>().join(", "),
                     next,
-                    ("What the data so far could not show", &document.blind_to),
+                    "What the data so far could not show",
+                    &document.blind_to,
                     out,
                 )?;
             }
@@ -190,7 +192,8 @@ fn of_scenario(file: &Path, limits: &Limits, arguments: &Arguments, terminal: &T
             write_plan(
                 &scenario.name,
                 &plan.next_experiment,
-                ("What it will not show, though it were large", &plan.blind_to),
+                "What it will not show, though it were large",
+                &plan.blind_to,
                 out,
             )?;
             scenarios
@@ -201,7 +204,7 @@ fn of_scenario(file: &Path, limits: &Limits, arguments: &Arguments, terminal: &T
     let room_m = limits.room_m.or_else(|| own.map(|own| [own.room_x_m, own.room_y_m]));
     let minutes = limits.minutes.or_else(|| own.and_then(|own| own.minutes)).unwrap_or(MINUTES);
     let instruments = match room_m {
-        Some(room_m) => instruments(&scenario, (room_m, minutes), terminal)?,
+        Some(room_m) => instruments(&scenario, room_m, minutes, terminal)?,
         None => Vec::new(),
     };
     terminal.document(&OfScenario { plan, scenarios, instruments })?;

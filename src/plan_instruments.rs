@@ -44,12 +44,14 @@ pub(crate) struct Expected {
 pub(crate) fn expected(robot: &Scenario, budget: Budget) -> Result<Vec<Expected>, Failure> {
     INSTRUMENTS
         .into_iter()
-        .map(|(instrument, what, text)| of_instrument((instrument, what, text), robot, budget))
+        .map(|(instrument, what, text)| of_instrument(instrument, what, text, robot, budget))
         .collect()
 }
 
 fn of_instrument(
-    (instrument, what, text): (&'static str, &'static str, &'static str),
+    instrument: &'static str,
+    what: &'static str,
+    text: &'static str,
     robot: &Scenario,
     budget: Budget,
 ) -> Result<Expected, Failure> {

@@ -32,7 +32,8 @@ fn page(command: &str, subject: String, headline: String, lead: &str) -> Report 
 pub(crate) fn write_plan(
     subject: &str,
     next: &NextExperiment,
-    (title, blind): (&str, &[Blind]),
+    title: &str,
+    blind: &[Blind],
     out: &Path,
 ) -> Result<(), Failure> {
     let lead = format!("Sought {}.", next.within);

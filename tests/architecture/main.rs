@@ -15,6 +15,7 @@ mod examples;
 mod file_graph;
 mod files;
 mod packages;
+mod parameters;
 mod pictures;
 mod python;
 mod settings;

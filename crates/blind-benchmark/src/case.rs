@@ -58,10 +58,10 @@ enum Attempt {
 }
 
 /// Sizes over the detection limit: of singles, and where names are asked for and not power.
-const SINGLE_RATIOS: (f64, f64) = (0.3, 10.0);
-const NAMED_RATIOS: (f64, f64) = (1.6, 10.0);
+const SINGLE_RATIOS: [f64; 2] = [0.3, 10.0];
+const NAMED_RATIOS: [f64; 2] = [1.6, 10.0];
 /// The same of large effects, as far as a real robot may have them.
-const LARGE_RATIOS: (f64, f64) = (10.0, 100.0);
+const LARGE_RATIOS: [f64; 2] = [10.0, 100.0];
 /// A size that cannot be chosen closer to the ratio wanted than this is drawn again.
 const MAX_RATIO_ERROR: f64 = 1.5;
 /// Steps in which a scale is sought.
@@ -73,7 +73,7 @@ const MIN_SHARE: f64 = 0.5;
 const ATTEMPTS: u64 = 10;
 
 /// The least and the largest size over the detection limit.
-const fn size_ratios(case_kind: CaseKind) -> (f64, f64) {
+const fn size_ratios(case_kind: CaseKind) -> [f64; 2] {
     match case_kind {
         CaseKind::Pair | CaseKind::OneLog => NAMED_RATIOS,
         CaseKind::Large => LARGE_RATIOS,
@@ -376,7 +376,7 @@ impl CaseOracle<'_> {
         &self,
         effect: &mut Hidden,
         draw: &mut Draw,
-        ratios: (f64, f64),
+        ratios: [f64; 2],
     ) -> Result<Result<ScaledEffect, Attempt>, ChallengeError> {
         let Self { plain, stops, truth, noise, .. } = self;
         // What was driven last, and at which scale: it is asked several things.
@@ -416,7 +416,7 @@ impl CaseOracle<'_> {
 fn scale(
     effect: &mut Hidden,
     draw: &mut Draw,
-    (low, high): (f64, f64),
+    [low, high]: [f64; 2],
     mut measured: impl FnMut(&Hidden, Hypotheses<'_>) -> Result<Option<Detectability>, ChallengeError>,
 ) -> Result<Chosen, ChallengeError> {
     if effect.kind == EffectKind::RecordFault {

@@ -97,7 +97,9 @@ fn drive_session(
         scenario.effects.extend(case.instrument_model.class.effect().filter(|effect| !ids.contains(&effect.id())));
     }
     let mut more: Vec<(&'static str, Box<dyn Forward>)> = Vec::new();
-    more.extend(case.conditions.ripple.map(|ripple| (SpeedRipple::ID, SpeedRipple::boxed(ripple))));
+    more.extend(
+        case.conditions.ripple.map(|(share, frequency_hz)| (SpeedRipple::ID, SpeedRipple::boxed(share, frequency_hz))),
+    );
     for hidden in hidden {
         match hidden.act() {
             Some(ActingEffect::Catalogue(effect)) => scenario.effects.push(effect),

@@ -154,7 +154,9 @@ pub struct CaseLogs {
 /// # Errors
 /// As [`challenge_case`].
 pub fn case_logs(
-    (scope, seed, number): (Scope, u64, u64),
+    scope: Scope,
+    seed: u64,
+    number: u64,
     recorded: Recorded,
 ) -> Result<Result<CaseLogs, &'static str>, ChallengeError> {
     let case = match Case::draw(scope, seed, number)? {

@@ -6,13 +6,14 @@ use std::collections::BTreeMap;
 use super::case_kind::CaseKind;
 use super::hidden::EffectKind;
 use super::instrument::NoiseClass;
-use super::measure_value::{Measure, share};
+use super::measure_value::{Counted, Measure, share};
 use super::oracle_view::OracleView;
 use super::power_ratio::power;
 use super::result::{CaseResult, Planned, Reported};
 
-fn count<'a, T: 'a>(all: impl Iterator<Item = &'a T>, holds: impl Fn(&T) -> bool) -> (usize, usize) {
-    all.fold((0, 0), |(k, n), one| (k + usize::from(holds(one)), n + 1))
+fn count<'a, T: 'a>(all: impl Iterator<Item = &'a T>, holds: impl Fn(&T) -> bool) -> Counted {
+    let (hits, of) = all.fold((0, 0), |(hits, of), one| (hits + usize::from(holds(one)), of + 1));
+    Counted { hits, of }
 }
 
 /// What was said of one hidden effect.
@@ -202,8 +203,13 @@ fn unresolved(cases: &[CaseResult]) -> Measure {
         k += case.unresolved_robots + usize::from(!is_resolved);
         n += case.unresolved_robots + 1;
     }
-    let measure =
-        share("unresolved", "robots whose encoder does not resolve the effect (shown only)", (k, n), 1.0, true);
+    let measure = share(
+        "unresolved",
+        "robots whose encoder does not resolve the effect (shown only)",
+        Counted { hits: k, of: n },
+        1.0,
+        true,
+    );
     Measure { met: None, ..measure }
 }
 
@@ -291,7 +297,7 @@ fn resolved(cases: &[CaseResult]) -> [Measure; 2] {
     let detectability = share(
         "sets_that_can_be_told",
         "sets that the oracle could resolve after more runs (shown only)",
-        (can, sets().count()),
+        Counted { hits: can, of: sets().count() },
         0.0,
         false,
     );

@@ -27,8 +27,16 @@ pub struct Measure {
     pub met: Option<bool>,
 }
 
+/// How many of some there are of which something holds.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Counted {
+    pub(crate) hits: usize,
+    pub(crate) of: usize,
+}
+
 /// A share of so many.
-pub(crate) fn share(id: &'static str, what: &'static str, (k, n): (usize, usize), bar: f64, at_most: bool) -> Measure {
+pub(crate) fn share(id: &'static str, what: &'static str, counted: Counted, bar: f64, at_most: bool) -> Measure {
+    let Counted { hits: k, of: n } = counted;
     let (low, high) = limits(k, n);
     let limit = if at_most { high } else { low };
     let value = (n > 0).then(|| k as f64 / n as f64);

@@ -22,7 +22,7 @@ impl SpeedRipple {
     /// The name of its draws.
     pub(crate) const ID: &'static str = "speed_ripple";
 
-    pub(crate) fn boxed((amplitude, frequency_hz): (f64, f64)) -> Box<dyn Forward> {
+    pub(crate) fn boxed(amplitude: f64, frequency_hz: f64) -> Box<dyn Forward> {
         Box::new(Self { amplitude, rate_rad_s: TAU * frequency_hz, phase_rad: Wheels::both(0.0) })
     }
 }

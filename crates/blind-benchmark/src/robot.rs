@@ -97,14 +97,14 @@ impl RandomRobot {
                 let scenario = at_drawn_speed(base.clone(), conditions, &mut paths);
                 // The first session has the odd run.
                 let runs = (conditions.runs + sessions - 1 - session) / sessions;
-                let programs = programs(family, &scenario, (driving_s, runs), &mut paths);
+                let programs = programs(family, &scenario, driving_s, runs, &mut paths);
                 SessionPlan { programs: in_runs(&programs, runs), scenario }
             })
             .collect();
         // At the first session's speed, on other paths of the family: what was never excited is no fair
         // question.
         let scenario = sessions[0].scenario.clone();
-        let held_out = SessionPlan { programs: programs(family, &scenario, (HELD_OUT_S, 1), &mut paths), scenario };
+        let held_out = SessionPlan { programs: programs(family, &scenario, HELD_OUT_S, 1, &mut paths), scenario };
         let other = other_session(family, base, conditions, &payload_kg, &mut draws.of("other session"));
         Ok(Self { family, sessions, held_out, other, payload_kg, jitter_s })
     }
@@ -153,7 +153,7 @@ fn other_session(
     let family = others[draw.below(others.len())];
     let scenario = at_drawn_speed(base, conditions, draw);
     let runs = payload_kg.len().max(2) as u32;
-    SessionPlan { programs: programs(family, &scenario, (HELD_OUT_S, runs), draw), scenario }
+    SessionPlan { programs: programs(family, &scenario, HELD_OUT_S, runs, draw), scenario }
 }
 
 /// The robot without what is hidden; its effects are the calibration errors alone.
@@ -196,12 +196,7 @@ const FREE_MOTIONS: usize = 5;
 
 /// Programs of a family that take so many seconds of driving, as many as runs are wanted where the time
 /// allows it.
-fn programs(
-    family: PathFamily,
-    scenario: &Scenario,
-    (driving_s, runs): (f64, u32),
-    draw: &mut Draw,
-) -> Vec<MotionProgram> {
+fn programs(family: PathFamily, scenario: &Scenario, driving_s: f64, runs: u32, draw: &mut Draw) -> Vec<MotionProgram> {
     let robot = &scenario.robot;
     let drive_limits = DriveLimits {
         wheel_separation_m: robot.wheel_separation_m,
@@ -215,10 +210,16 @@ fn programs(
     let tightest_m = MIN_ARC_RADIUS_RATIO * robot.wheel_separation_m;
     if matches!(family, PathFamily::Free | PathFamily::Forward) {
         let mut programs: Vec<MotionProgram> = Vec::new();
-        let limits = (robot.cruise_speed_m_s, tightest_m);
         let share = (driving_s / (FREE_RUN_S * f64::from(runs))).clamp(MIN_LENGTH_SHARE, 1.0);
         while programs.len() < 2 || takes_s(&programs) < driving_s {
-            programs.push(free(programs.len(), family == PathFamily::Forward, limits, share, draw));
+            programs.push(free(
+                programs.len(),
+                family == PathFamily::Forward,
+                robot.cruise_speed_m_s,
+                tightest_m,
+                share,
+                draw,
+            ));
         }
         return programs;
     }
@@ -228,7 +229,7 @@ fn programs(
     loop {
         let [straight_m, side_m, radius_m] = seconds.map(|time_s| robot.cruise_speed_m_s * time_s * share);
         let radius_m = radius_m.max(tightest_m);
-        let schedules = |times: f64| programs_of(&schedules(family, (straight_m, side_m, radius_m), times));
+        let schedules = |times: f64| programs_of(&schedules(family, straight_m, side_m, radius_m, times));
         let times = driving_s / takes_s(&schedules(1.0));
         let programs = schedules(times);
         let is_enough = programs.len() >= runs as usize && takes_s(&programs) < MAX_OVERTIME * driving_s;
@@ -245,7 +246,7 @@ const FREE_RUN_S: f64 = 18.0;
 const MAX_OVERTIME: f64 = 1.5;
 
 /// The schedules of a family whose runs are protocols, so many times its usual number of each.
-fn schedules(family: PathFamily, (length_m, side_m, radius_m): (f64, f64, f64), times: f64) -> Vec<Schedule> {
+fn schedules(family: PathFamily, length_m: f64, side_m: f64, radius_m: f64, times: f64) -> Vec<Schedule> {
     let pairs = |usual: f64| ((usual * times).round() as u32).max(1);
     let straights = Schedule::Straights { length_m, runs: 2 * pairs(3.0) };
     let squares = Schedule::Squares { side_m, runs_each_way: pairs(2.0) };
@@ -307,7 +308,7 @@ pub(crate) fn programs_of(schedules: &[Schedule]) -> Vec<MotionProgram> {
     programs
 }
 
-fn free(run: usize, forward: bool, (speed_m_s, tightest_m): (f64, f64), share: f64, draw: &mut Draw) -> MotionProgram {
+fn free(run: usize, forward: bool, speed_m_s: f64, tightest_m: f64, share: f64, draw: &mut Draw) -> MotionProgram {
     let motions = (0..FREE_MOTIONS)
         .map(|_| {
             let length_m = share * speed_m_s * draw.uniform(1.5, 4.0);

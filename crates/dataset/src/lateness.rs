@@ -15,20 +15,20 @@ pub(crate) fn lateness(t_s: &[f64], numbers: &[i64], period_s: f64) -> Vec<f64> 
     // Sums of a window slide along; times over numbers stay small for precision.
     let mut sums = Sums::default();
     let (mut from, mut to) = (0, 0);
-    let point = |row: usize| (numbers[row] as f64, t_s[row] - period_s * numbers[row] as f64);
+    let number_of = |row: usize| numbers[row] as f64;
+    let rest_s = |row: usize| t_s[row] - period_s * numbers[row] as f64;
     let most_are = (0..rows).filter(|row| is_alone(numbers, *row)).count() * 2 > rows;
     let weight = |row: usize| if is_alone(numbers, row) || !most_are { 1.0 } else { 0.0 };
     let late = |row: usize| {
         while to < rows.min(row + line_rows + 1) {
-            sums.add(point(to), weight(to));
+            sums.add(number_of(to), rest_s(to), weight(to));
             to += 1;
         }
         while from + line_rows < row {
-            sums.add(point(from), -weight(from));
+            sums.add(number_of(from), rest_s(from), -weight(from));
             from += 1;
         }
-        let (number, rest_s) = point(row);
-        rest_s - sums.line_at(number)
+        rest_s(row) - sums.line_at(number_of(row))
     };
     (0..rows).map(late).collect()
 }
@@ -58,7 +58,7 @@ pub(crate) struct Sums {
 }
 
 impl Sums {
-    pub(crate) fn add(&mut self, (x, y): (f64, f64), times: f64) {
+    pub(crate) fn add(&mut self, x: f64, y: f64, times: f64) {
         self.count += times;
         self.x += times * x;
         self.y += times * y;

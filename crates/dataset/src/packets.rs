@@ -63,7 +63,7 @@ impl Packets {
             return Some(Received { period_s, read_s });
         }
         let (period_s, late_s) = beat_of(&packets.sent_s(t_s))?;
-        packets.rows_read(t_s, (period_s, &late_s))
+        packets.rows_read(t_s, period_s, &late_s)
     }
 
     /// When each was sent: the stamps of the last rows.
@@ -73,7 +73,7 @@ impl Packets {
 
     /// When the rows were read, by the packets' period and what each of them is late by; `None` where one is
     /// longer than usual and reaches into the one before.
-    fn rows_read(&self, t_s: &[f64], (sent_period_s, sent_late_s): (f64, &[f64])) -> Option<Received> {
+    fn rows_read(&self, t_s: &[f64], sent_period_s: f64, sent_late_s: &[f64]) -> Option<Received> {
         let period_s = sent_period_s / self.rows as f64;
         let of_packet = |(packet, late_s): (&Range<usize>, &f64)| {
             let sent_s = t_s[packet.end - 1] - late_s;
@@ -93,7 +93,7 @@ fn row_timing_s(packets: &[Range<usize>], t_s: &[f64]) -> Option<[f64; 2]> {
     // Times over numbers stay small for precision.
     let sent = || packets.iter().map(|packet| (packet.end - 1) as f64).zip(packets.iter().map(|of| t_s[of.end - 1]));
     let mut line = Sums::default();
-    sent().for_each(|(row, sent_s)| line.add((row, sent_s - mean_period_s * row), 1.0));
+    sent().for_each(|(row, sent_s)| line.add(row, sent_s - mean_period_s * row, 1.0));
     let first_s = line.line_at(0.0);
     let period_s = mean_period_s + (line.line_at(rows) - first_s) / rows;
     let squares_s2: f64 = sent().map(|(row, sent_s)| (sent_s - first_s - period_s * row).powi(2)).sum();

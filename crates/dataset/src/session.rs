@@ -271,9 +271,9 @@ impl<'a> RunView<'a> {
 #[must_use]
 pub fn fit_rigid(pairs: impl Iterator<Item = (Point, Point)> + Clone) -> Option<Pose> {
     let mut sums = RigidSums::default();
-    pairs.clone().for_each(|pair| sums.add(pair));
+    pairs.clone().for_each(|(body, room)| sums.add(body, room));
     let mut moments = sums.moments();
-    pairs.for_each(|pair| moments.add(pair));
+    pairs.for_each(|(body, room)| moments.add(body, room));
     let [x_m, y_m, theta_rad] = moments.pose(&Branching);
     // NaN where there is none.
     (!theta_rad.is_nan()).then_some(Pose::new(x_m, y_m, theta_rad))
@@ -285,11 +285,11 @@ pub fn fit_rigid(pairs: impl Iterator<Item = (Point, Point)> + Clone) -> Option<
 #[must_use]
 pub fn fit_two_points(elementary: &impl Elementary, [a, b]: [(Point, Point); 2]) -> [f64; 3] {
     let mut sums = RigidSums::default();
-    sums.add(a);
-    sums.add(b);
+    sums.add(a.0, a.1);
+    sums.add(b.0, b.1);
     let mut moments = sums.moments();
-    moments.add(a);
-    moments.add(b);
+    moments.add(a.0, a.1);
+    moments.add(b.0, b.1);
     moments.pose(elementary)
 }
 
@@ -303,7 +303,7 @@ struct RigidSums {
 
 impl RigidSums {
     #[inline(always)]
-    fn add(&mut self, (body, room): (Point, Point)) {
+    fn add(&mut self, body: Point, room: Point) {
         self.count += 1.0;
         self.body = Point::new(self.body.x_m + body.x_m, self.body.y_m + body.y_m);
         self.room = Point::new(self.room.x_m + room.x_m, self.room.y_m + room.y_m);
@@ -335,7 +335,7 @@ struct RigidMoments {
 
 impl RigidMoments {
     #[inline(always)]
-    fn add(&mut self, (body, room): (Point, Point)) {
+    fn add(&mut self, body: Point, room: Point) {
         let (bx, by) = (body.x_m - self.body.x_m, body.y_m - self.body.y_m);
         let (rx, ry) = (room.x_m - self.room.x_m, room.y_m - self.room.y_m);
         self.dot += bx * rx + by * ry;

@@ -182,7 +182,7 @@ impl<'a> Explained<'_, 'a> {
         let next = match &options.limits {
             None => Err("none was sought".to_owned()),
             Some(limits) => {
-                next_experiment(records, (&structure.base, &structure.found), (model, catalogue, &blind_to), limits)
+                next_experiment(records, &structure.base, &structure.found, model, catalogue, &blind_to, limits)
             }
         };
         let extended = scenario_of(records, &self.log.datasets[0].robot, self.faults, self.stamps, &carried);

@@ -42,12 +42,17 @@ pub(crate) fn finding(finding: &Finding) -> document::Finding {
         in_extended_model: finding.carry_over.as_ref().map(|_| finding.is_in_extended_model()),
         by_session: by(Level::Session),
         by_kind: by(Level::Kind),
-        heterogeneity: finding.carry_over.iter().flat_map(CarryOver::heterogeneity).map(differences).collect(),
+        heterogeneity: finding
+            .carry_over
+            .iter()
+            .flat_map(CarryOver::heterogeneity)
+            .map(|(level, of)| differences(level, of))
+            .collect(),
     }
 }
 
 /// How sizes differ between units, as scripts get it.
-fn differences((level, of): (Level, Heterogeneity)) -> document::Differences {
+fn differences(level: Level, of: Heterogeneity) -> document::Differences {
     document::Differences {
         level: match level {
             Level::Session => GainLevel::Sessions,

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use kinematics::{Side, Wheels, sin_cos, sinc};
+use kinematics::{Side, Twist, Wheels, sin_cos, sinc};
 
 /// What was recorded of an interval, each over a size that makes it about 1.
 #[derive(Debug, Clone, PartialEq)]
@@ -317,6 +317,10 @@ pub(crate) struct KinematicSample<'r> {
 }
 
 impl KinematicSample<'_> {
+    pub(crate) const fn twist(&self) -> Twist {
+        Twist { v_m_s: self.v_m_s, omega_rad_s: self.omega_rad_s }
+    }
+
     /// A wheel's speed times the mean over the interval of a sine, and of a cosine, that comes back so many
     /// times a turn.
     pub(crate) fn of_cycle(&self, side: Side, cycles: u8) -> (f64, f64) {

@@ -55,7 +55,8 @@ impl Estimates<'_> {
     pub(crate) fn with_direction(
         &self,
         name: &str,
-        (scale, unit): (f64, &str),
+        scale: f64,
+        unit: &str,
         positive: &'static str,
         negative: &'static str,
     ) -> String {
@@ -141,7 +142,7 @@ mod tests {
     #[test]
     fn a_sign_becomes_a_word() {
         let of = |value: f64| Estimates::from_iter([("x_m", Estimate { value, sigma: Some(1.2e-3) })]);
-        let shown = |value| of(value).with_direction("x_m", (1e3, "mm"), "ahead", "behind");
+        let shown = |value| of(value).with_direction("x_m", 1e3, "mm", "ahead", "behind");
         assert_eq!(
             (shown(0.025), shown(-0.025)),
             ("25.0 ± 1.2 mm ahead".to_owned(), "25.0 ± 1.2 mm behind".to_owned())

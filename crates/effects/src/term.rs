@@ -13,7 +13,7 @@
 
 use std::collections::BTreeMap;
 
-use kinematics::Wheels;
+use kinematics::{Twist, Wheels};
 use model_term::ModelTerm;
 use serde::{Deserialize, Serialize};
 
@@ -191,7 +191,7 @@ impl PhysicalEffect for SparseTerm {
             session_s: 0.0,
             session_m: 0.0,
             memory: MotionHistoryTracker::NONE,
-            speeds: (0.0, 0.0),
+            twist: Twist::default(),
         }))
     }
 
@@ -219,7 +219,7 @@ struct State {
     session_m: f64,
     memory: MotionHistoryTracker,
     /// v and ω of the last step, for what is seen after it.
-    speeds: (f64, f64),
+    twist: Twist,
 }
 
 impl Forward for State {
@@ -229,7 +229,7 @@ impl Forward for State {
 
     fn on_run_start(&mut self, run: &mut RunStart<'_>) {
         (self.session_s, self.session_m) = (run.session_s, run.session_m);
-        (self.memory, self.speeds) = (MotionHistoryTracker::NONE, (0.0, 0.0));
+        (self.memory, self.twist) = (MotionHistoryTracker::NONE, Twist::default());
         for (key, values) in &self.size.of_runs {
             let value = values[run.number as usize % values.len()];
             let predicted = *run.info.covariates.entry(key.clone()).or_insert(value);
@@ -244,7 +244,7 @@ impl Forward for State {
         let wheel_m_s = step.radius_m.zip_with(step.rate_rad_s, |radius_m, rate| radius_m * rate);
         let wheel_m_s2 = step.radius_m.zip_with(step.acceleration_rad_s2, |radius_m, rate| radius_m * rate);
         let (v_m_s, omega_rad_s) = (mean(wheel_m_s), turn(wheel_m_s));
-        self.speeds = (v_m_s, omega_rad_s);
+        self.twist = Twist { v_m_s, omega_rad_s };
         if self.sparse.channel.is_of_instrument() {
             return;
         }
@@ -293,9 +293,9 @@ impl Forward for State {
     }
 
     fn instrument(&mut self, reading: &mut PoseReading) {
-        let at = seen(self.speeds, reading.world_from_body, reading.t_s);
+        let at = seen(self.twist, reading.world_from_body, reading.t_s);
         let size = self.size.coefficient * self.sparse.product(&at);
-        reading.world_from_body = reading.world_from_body * on_channel(self.sparse.channel, size, self.speeds);
+        reading.world_from_body = reading.world_from_body * on_channel(self.sparse.channel, size, self.twist);
     }
 
     fn needs_stepping(&self) -> Option<&'static str> {

@@ -1,6 +1,7 @@
 //! Symmetric matrices of a pose, several at a time: the filter's covariance, and its derivatives by the
 //! logarithm of each variance.
 
+use kinematics::Rotation;
 use nalgebra::{Matrix3, Vector3};
 
 /// Several symmetric matrices of a pose, element by element: each operation acts on all of them.
@@ -44,7 +45,7 @@ impl<const N: usize> Covariances<N> {
 
     /// R P Rᵀ for a turn of the frame.
     #[inline(always)]
-    pub(super) fn turned(&self, (sin, cos): (f64, f64)) -> Self {
+    pub(super) fn turned(&self, Rotation { sin, cos }: Rotation) -> Self {
         let mut turned = Self::ZERO;
         for k in 0..N {
             let (xx, xy, yy) = (self.xx[k], self.xy[k], self.yy[k]);

@@ -1,5 +1,6 @@
 //! Derivatives of poses by the columns of the normal equation, laid out for vector instructions.
 
+use kinematics::Rotation;
 use nalgebra::{Matrix3, Vector3};
 
 /// Derivatives of a pose or a motion by columns, coordinate by coordinate, so that loops over columns
@@ -43,7 +44,7 @@ impl Derivatives {
 
     /// Adds others, turned by an angle, from a column on.
     #[inline(always)]
-    pub(super) fn add_turned(&mut self, from: usize, (sin, cos): (f64, f64), others: &Self) {
+    pub(super) fn add_turned(&mut self, from: usize, Rotation { sin, cos }: Rotation, others: &Self) {
         let own = self.x[from..].iter_mut().zip(&mut self.y[from..]).zip(&mut self.theta[from..]);
         for (((x, y), theta), ((of_x, of_y), of_theta)) in own.zip(others.x.iter().zip(&others.y).zip(&others.theta)) {
             *x += cos * of_x - sin * of_y;

@@ -5,7 +5,7 @@
 //! With gain k = P h/s the sensitivities follow D⁺ = D + k·∂v/∂p, exactly: gains do not depend on the mean
 //! parameters. Those of P by ln(variance) follow the same recursion, differentiated.
 
-use kinematics::{Kernel, Pose, Twist, Wheels, sin_cos, wrap_to_pi};
+use kinematics::{Kernel, Pose, Rotation, Twist, Wheels, sin_cos, wrap_to_pi};
 use model_term::ModelTerm;
 use nalgebra::{Matrix3, Vector3};
 
@@ -76,7 +76,7 @@ impl Kernel for FilterRun<'_, '_, '_> {
         filter.propagator.restart();
         let Some(first) = propagations.first() else {
             let start_s = filter.segment.intervals.first().map_or(0.0, |interval| interval.t_s);
-            filter.start(Pose::IDENTITY, (0.0, 0.0), 0, (0, start_s));
+            filter.start(Pose::IDENTITY, [0.0; 2], 0, 0, start_s);
             let intervals = 0..filter.segment.intervals.len();
             let noise = Covariances::ZERO;
             filter.predict(0, &PropagationInterval { intervals, from: 0, measurement: 0, noise, restored: None });
@@ -84,10 +84,10 @@ impl Kernel for FilterRun<'_, '_, '_> {
         };
         filter.propagator.skip(0..first.intervals.start);
         match filter.segment.start {
-            Start::MeasuredPose => filter.start_at((0, first.from), first.intervals.start, free_heading_rad),
+            Start::MeasuredPose => filter.start_at(0, first.from, first.intervals.start, free_heading_rad),
             Start::Origin => {
                 let start_s = filter.segment.intervals.first().map_or(0.0, |interval| interval.t_s);
-                filter.start(Pose::IDENTITY, (0.0, 0.0), 0, (0, start_s));
+                filter.start(Pose::IDENTITY, [0.0; 2], 0, 0, start_s);
             }
         }
         let mut rejected_in_a_row = 0;
@@ -104,11 +104,7 @@ impl Kernel for FilterRun<'_, '_, '_> {
                 && filter.segment.measurements[propagation.measurement].theta_rad.is_some()
                 && filter.segment.start == Start::MeasuredPose;
             if rules::Rule::RestartAfterOutliers.applies(restarts) {
-                filter.start_at(
-                    (number + 1, propagation.measurement),
-                    propagation.intervals.end,
-                    filter.pose.theta_rad,
-                );
+                filter.start_at(number + 1, propagation.measurement, propagation.intervals.end, filter.pose.theta_rad);
                 rejected_in_a_row = 0;
             }
         }
@@ -198,12 +194,12 @@ impl<'f, 'a> Filter<'f, 'a> {
 
     /// Starts at a measurement, after a number of propagation intervals.
     #[inline(always)]
-    fn start_at(&mut self, (propagations, measurement): (usize, usize), next_piece: usize, free_heading_rad: f64) {
+    fn start_at(&mut self, propagations: usize, measurement: usize, next_piece: usize, free_heading_rad: f64) {
         let measured = self.segment.measurements[measurement];
         let [xy, theta] = self.variance_of(&measured);
         let pose = Pose::new(measured.x_m, measured.y_m, measured.theta_rad.unwrap_or(free_heading_rad));
         let free = measured.theta_rad.is_none();
-        self.start(pose, (xy, if free { 0.0 } else { theta }), next_piece, (propagations, measured.t_s));
+        self.start(pose, [xy, if free { 0.0 } else { theta }], next_piece, propagations, measured.t_s);
         if let Some(shape) = &measured.shape {
             let lever = if free { Vector3::zeros() } else { self.lever(measured.x_m, measured.y_m) };
             let [whole, position, heading] = shape.at_start(self.instrument_variance(), lever);
@@ -231,13 +227,7 @@ impl<'f, 'a> Filter<'f, 'a> {
     }
 
     #[inline(always)]
-    fn start(
-        &mut self,
-        measured: Pose,
-        (var_xy, var_theta): (f64, f64),
-        after: usize,
-        (propagations, t_s): (usize, f64),
-    ) {
+    fn start(&mut self, measured: Pose, [var_xy, var_theta]: [f64; 2], after: usize, propagations: usize, t_s: f64) {
         let twist = self.propagator.twist(self.segment.rate_at(after, t_s));
         let Instrument { body_from_sensor: Pose { x_m: lx, y_m: ly, theta_rad: ltheta }, latency_s: late } =
             self.instrument;
@@ -262,9 +252,9 @@ impl<'f, 'a> Filter<'f, 'a> {
             self.by.set(Column::SensorTheta.index(), Vector3::new(-mounted.y, mounted.x, -1.0));
             self.by.set(Column::Latency.index(), by_latency);
         }
-        self.measurement(propagations, (t_s, twist), sin_cos(self.pose.theta_rad));
+        self.measurement(propagations, t_s, twist, Rotation::by(self.pose.theta_rad));
         // What went before the start is not of the next one.
-        let _ = self.propagator.sample(self.pose, (self.number, 0));
+        let _ = self.propagator.sample(self.pose, self.number, 0);
         for (number, size) in self.model.term_values.iter().enumerate() {
             let measurement = self.by_measurement.get(number);
             self.by.set(self.layout.first_term() + number, -measurement);
@@ -305,7 +295,7 @@ impl<'f, 'a> Filter<'f, 'a> {
     /// Finds what the terms add to the measurement after so many propagation intervals at the pose in force,
     /// in the room, for each parameter; the pose has a heading of this sine and cosine.
     #[inline(always)]
-    fn measurement(&mut self, propagations: usize, (t_s, twist): (f64, Twist), (sin, cos): (f64, f64)) {
+    fn measurement(&mut self, propagations: usize, t_s: f64, twist: Twist, Rotation { sin, cos }: Rotation) {
         self.propagator.measurement(self.pose, propagations, t_s, twist);
         let by_measurement =
             self.by_measurement.x.iter_mut().zip(&mut self.by_measurement.y).zip(&mut self.by_measurement.theta);
@@ -348,7 +338,13 @@ impl<'f, 'a> Filter<'f, 'a> {
 
     /// The innovation of a measurement after so many intervals, at a heading of this sine and cosine.
     #[inline(always)]
-    fn innovation(&self, measured: &MeasuredPose, after: usize, twist: Twist, (sin, cos): (f64, f64)) -> Innovation {
+    fn innovation(
+        &self,
+        measured: &MeasuredPose,
+        after: usize,
+        twist: Twist,
+        Rotation { sin, cos }: Rotation,
+    ) -> Innovation {
         let Instrument { body_from_sensor: Pose { x_m: lx, y_m: ly, theta_rad: ltheta }, latency_s: late } =
             self.instrument;
         let mounted = Vector3::new(cos * lx - sin * ly, sin * lx + cos * ly, 0.0);
@@ -380,14 +376,14 @@ impl<'f, 'a> Filter<'f, 'a> {
         let Some(interval) = self.segment.intervals[propagation.intervals.clone()].last().copied() else { return true };
         let variance = self.variance_of(&measured);
         let model = self.model;
-        let (sin, cos) = sin_cos(self.pose.theta_rad);
+        let heading @ Rotation { sin, cos } = Rotation::by(self.pose.theta_rad);
         let (rounding, mut state) = self.rounded();
-        rounding.enter(&mut state, variance, interval.interpolated_rad2[1], (model, (sin, cos)));
+        rounding.enter(&mut state, variance, interval.interpolated_rad2[1], model, heading);
         let twist = self.propagator.twist(interval.rate_at_ends_rad_s[1]);
-        self.measurement(number + 1, (measured.t_s, twist), (sin, cos));
-        let sample = self.propagator.sample(self.pose, (self.number, propagation.measurement));
+        self.measurement(number + 1, measured.t_s, twist, heading);
+        let sample = self.propagator.sample(self.pose, self.number, propagation.measurement);
         let Innovation { error, by_heading, by_latency } =
-            self.innovation(&measured, propagation.intervals.end, twist, (sin, cos));
+            self.innovation(&measured, propagation.intervals.end, twist, heading);
         // Derivatives of a component of the measurement by the pose; rows: along, across, heading.
         let axes = [Vector3::new(cos, sin, 0.0), Vector3::new(-sin, cos, 0.0), Vector3::z()];
         let components = if measured.theta_rad.is_some() { 3 } else { 2 };

@@ -1,6 +1,6 @@
 //! What the filter carries from measurement to measurement, and how it moves.
 
-use kinematics::{Pose, sin_cos};
+use kinematics::{Pose, Rotation};
 use nalgebra::Vector3;
 
 use crate::covariances::{Covariance, Covariances};
@@ -40,21 +40,21 @@ impl FilterState<'_> {
     #[inline(always)]
     pub(crate) fn advance(&mut self, step: &Step<'_>) {
         let Step { motion, by_geometry, by_terms, first_term, noise, variance, restored, noise_score } = *step;
-        let (sin, cos) = sin_cos(self.pose.theta_rad);
+        let heading @ Rotation { sin, cos } = Rotation::by(self.pose.theta_rad);
         let room = |v: Vector3<f64>| Vector3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z);
         let step = room(Vector3::new(motion.x_m, motion.y_m, motion.theta_rad));
         self.by.turn(step);
         for (column, of_propagation) in by_geometry.into_iter().enumerate() {
             self.by.set(column, self.by.get(column) + room(of_propagation));
         }
-        self.by.add_turned(first_term, (sin, cos), by_terms);
+        self.by.add_turned(first_term, heading, by_terms);
         *self.pose = Pose::new(self.pose.x_m + step.x, self.pose.y_m + step.y, self.pose.theta_rad + step.z);
-        let noise = noise.turned((sin, cos)).times(variance);
+        let noise = noise.turned(heading).times(variance);
         self.covariance.carry(-step.y, step.x);
         self.covariance.add(0, &noise, 0);
         self.covariance.add(0, &noise, 1);
         if let Some(restored) = restored {
-            self.covariance.add(0, &restored.turned((sin, cos)), 0);
+            self.covariance.add(0, &restored.turned(heading), 0);
         }
         if noise_score {
             self.covariance_by.carry(-step.y, step.x);

@@ -77,7 +77,8 @@ impl KinematicSampler {
         start_s: f64,
         intervals: &[WheelInterval],
         model: &Model,
-        (mut wheel_rad, mut session_m): (Wheels<f64>, f64),
+        mut wheel_rad: Wheels<f64>,
+        mut session_m: f64,
     ) {
         for interval in intervals {
             let travel_m = model.m_per_rad.zip_with(interval.wheel_rad, |m_per_rad, rad| m_per_rad * rad);
@@ -118,7 +119,8 @@ impl KinematicSampler {
     /// before.
     pub(crate) fn sample(
         &mut self,
-        (segment, measurement): (usize, usize),
+        segment: usize,
+        measurement: usize,
         world_from_body: Pose,
     ) -> Option<KinematicSample> {
         let Self { motion, duration_s, speed_change_m_s, phase_rad, turned_rad, .. } = *self;
@@ -176,16 +178,16 @@ mod tests {
         let geometry = DriveGeometry::new(Wheels::both(2.0), 0.5).expect("a drive");
         let model = Model::of(&geometry, 0);
         let mut sampler = KinematicSampler::new();
-        sampler.add(10.0, &intervals[..2], &model, (Wheels::both(2.0), 5.0));
-        let first = sampler.sample((0, 1), Pose::IDENTITY).expect("two seconds went by");
+        sampler.add(10.0, &intervals[..2], &model, Wheels::both(2.0), 5.0);
+        let first = sampler.sample(0, 1, Pose::IDENTITY).expect("two seconds went by");
         assert_eq!((first.motion.distance_m, first.duration_s, first.since_reversal_m), (0.1, 2.0, None));
         // Session's clock and distance at the start of the last interval; 2 rad and the 0.1 rad of the
         // first one.
         assert_eq!((first.session_s, first.session_m, first.phase_rad.left), (11.0, 5.1, 2.1));
         // Sums start anew: a second sample without motion.
-        assert_eq!(sampler.sample((0, 2), Pose::IDENTITY), None);
-        sampler.add(10.0, &intervals[2..], &model, (Wheels::both(2.1), 5.1));
-        let second = sampler.sample((0, 3), Pose::IDENTITY).expect("one second went by");
+        assert_eq!(sampler.sample(0, 2, Pose::IDENTITY), None);
+        sampler.add(10.0, &intervals[2..], &model, Wheels::both(2.1), 5.1);
+        let second = sampler.sample(0, 3, Pose::IDENTITY).expect("one second went by");
         assert_eq!(
             (second.motion.distance_m, second.turned_rad.right, second.since_reversal_m),
             (-0.2, -0.2, Some(0.2))
@@ -229,8 +231,8 @@ mod tests {
         let wheels = |left, right| Wheels { left, right };
         let arcs = intervals(&[(0.5, wheels(0.25, 0.5)), (0.0, wheels(0.125, 0.125)), (2.0, wheels(-0.5, 1.0))]);
         let mut sampler = KinematicSampler::new();
-        sampler.add(8.0, &arcs, &model(), (wheels(1.0, 2.0), 16.0));
-        let found = sampler.sample((3, 4), Pose::IDENTITY).expect("time went by");
+        sampler.add(8.0, &arcs, &model(), wheels(1.0, 2.0), 16.0);
+        let found = sampler.sample(3, 4, Pose::IDENTITY).expect("time went by");
         assert_eq!((found.segment, found.measurement, found.duration_s), (3, 4, 2.5));
         // The interval without length is no part of the motion: (0.375 + 0.25) m, (0.25 + 1.5)/0.5 rad.
         assert_eq!((found.motion.distance_m, found.motion.turn_rad), (0.625, 3.5));
@@ -242,8 +244,8 @@ mod tests {
         assert_eq!((found.phase_rad, found.session_s, found.session_m), (wheels(1.125, 3.125), 8.5, 16.5));
         // Sums start anew, the last interval stays until the next.
         let next = intervals(&[(1.0, wheels(0.5, 0.5))]);
-        sampler.add(8.0, &next, &model(), (wheels(2.0, 2.0), 20.0));
-        let found = sampler.sample((3, 5), Pose::IDENTITY).expect("time went by");
+        sampler.add(8.0, &next, &model(), wheels(2.0, 2.0), 20.0);
+        let found = sampler.sample(3, 5, Pose::IDENTITY).expect("time went by");
         assert_eq!((found.motion.distance_m, found.motion.turn_rad, found.duration_s), (0.5, 0.0, 1.0));
         assert_eq!((found.turned_rad, found.speed_change_m_s), (wheels(0.5, 0.5), 0.25));
         assert_eq!((found.phase_rad, found.session_m), (wheels(2.25, 2.25), 20.0));
@@ -254,8 +256,8 @@ mod tests {
         let mut sampler = KinematicSampler::new();
         let mut since = |distances_m: &[f64]| {
             let turns: Vec<(f64, Wheels<f64>)> = distances_m.iter().map(|m| (1.0, Wheels::both(*m))).collect();
-            sampler.add(0.0, &intervals(&turns), &model(), (Wheels::both(0.0), 0.0));
-            sampler.sample((0, 0), Pose::IDENTITY).expect("time went by").since_reversal_m
+            sampler.add(0.0, &intervals(&turns), &model(), Wheels::both(0.0), 0.0);
+            sampler.sample(0, 0, Pose::IDENTITY).expect("time went by").since_reversal_m
         };
         // The first motion is no reversal in either direction, and less than half a millimetre has none.
         assert_eq!(since(&[-0.4e-3, 0.8e-3]), None);

@@ -11,7 +11,7 @@
 //! with the poses alone: ln p(partial | poses) = ln p(partial, poses) − ln p(poses). The poses themselves
 //! stay with [`crate::filter`], and a measurement of no weight changes nothing.
 
-use kinematics::{Pose, sin_cos, wrap_to_pi};
+use kinematics::{Pose, Rotation, sin_cos, wrap_to_pi};
 use model_term::ModelTerm;
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -21,7 +21,7 @@ use crate::noise_score::NoiseScore;
 use crate::normal_equations::NormalEquations;
 use crate::partial_noise::{NoiseDerivatives, OF_MOTION};
 use crate::partial_observation::{Observation, Place, Quantity};
-use crate::partial_poses::{PoseUpdate, TakenPoses, Taking, instrument_by_terms};
+use crate::partial_poses::{PoseUpdate, StatePose, TakenPoses, Taking, instrument_by_terms};
 use crate::partial_records::PartialSegment;
 use crate::pass_options::OutlierGate;
 use crate::products::{Products, Sums};
@@ -80,19 +80,27 @@ pub(crate) struct Filtered {
     pub(crate) outliers: Vec<usize>,
 }
 
-/// What the partial measurements of a segment say, given its `poses`; `propagations` lead to each place after
+/// What the filters of all segments share.
+#[derive(Clone, Copy)]
+pub(crate) struct PartialPass<'p> {
+    pub(crate) poses: &'p TakenPoses<'p>,
+    pub(crate) gate: OutlierGate,
+    pub(crate) model: &'p Model,
+    pub(crate) noise: &'p Noise,
+    pub(crate) products: &'p Products,
+}
+
+/// What the partial measurements of a segment say, given its poses; `propagations` lead to each place after
 /// the first.
 pub(crate) fn filter_partial(
     segment: &PartialSegment<'_>,
-    (propagations, gate): (&[PropagationInterval], OutlierGate),
-    poses: &TakenPoses<'_>,
-    (model, noise): (&Model, &Noise),
-    products: &Products,
+    propagations: &[PropagationInterval],
+    pass: &PartialPass<'_>,
     terms: &mut [Box<dyn ModelTerm>],
 ) -> Filtered {
     let mut filtered = |taking: Taking| {
-        let observations: Vec<bool> = segment.observations.iter().map(|of| poses.takes(of, taking)).collect();
-        filter_taken(segment, (propagations, &observations, gate), poses, (model, noise), products, terms)
+        let observations: Vec<bool> = segment.observations.iter().map(|of| pass.poses.takes(of, taking)).collect();
+        filter_taken(segment, propagations, &observations, pass, terms)
     };
     let mut all = filtered(Taking::All);
     if segment.has_poses() {
@@ -106,14 +114,14 @@ pub(crate) fn filter_partial(
 /// Filters the observations of a segment that are taken.
 pub(crate) fn filter_taken(
     segment: &PartialSegment<'_>,
-    (propagations, taken, gate): (&[PropagationInterval], &[bool], OutlierGate),
-    poses: &TakenPoses<'_>,
-    (model, noise): (&Model, &Noise),
-    products: &Products,
+    propagations: &[PropagationInterval],
+    taken: &[bool],
+    pass: &PartialPass<'_>,
     terms: &mut [Box<dyn ModelTerm>],
 ) -> Filtered {
+    let PartialPass { poses, model, noise, .. } = *pass;
     let columns = Column::BASE.len() + terms.iter().map(|term| term.parameters().len()).sum::<usize>();
-    let mut sums = Sums::new(products);
+    let mut sums = Sums::new(pass.products);
     let mut filter = PartialFilter::new(segment, taken, poses.start(segment, model), columns);
     let mut propagator = Propagator::new(&segment.segment, model, terms);
     propagator.restart();
@@ -143,19 +151,19 @@ pub(crate) fn filter_taken(
                     }
                     if restarts || !is_outlier {
                         let at = filter.at_place(number);
-                        let state = (filter.pose_at(at), at, filter.state.len());
-                        let of = PoseUpdate::of(measured, (segment, number), state, (model, noise), &mut propagator);
+                        let state = StatePose { pose: filter.pose_at(at), at, size: filter.state.len() };
+                        let of = PoseUpdate::of(measured, segment, number, state, model, noise, &mut propagator);
                         filter.update_pose(&of, columns, &mut sums);
                     }
                 }
                 quantity => {
                     let by_terms = if quantity.is_of_an_instant() {
                         let pose = filter.pose_at(filter.at_place(number));
-                        instrument_by_terms((segment, number), pose, of.t_s, &mut propagator)
+                        instrument_by_terms(segment, number, pose, of.t_s, &mut propagator)
                     } else {
                         Vec::new()
                     };
-                    filter.update_gated((at, of, &by_terms), gate, model, columns, &mut sums);
+                    filter.update_gated(at, of, &by_terms, pass, columns, &mut sums);
                 }
             }
             filter.forget(at);
@@ -248,8 +256,7 @@ impl<'f> PartialFilter<'f> {
 
     /// Moves the counts' pose on.
     fn advance(&mut self, moved: &Moved, by_terms: &[Vector3<f64>], propagation: &PropagationInterval, noise: &Noise) {
-        let turn = sin_cos(self.state[2]);
-        let (sin, cos) = turn;
+        let turn @ Rotation { sin, cos } = Rotation::by(self.state[2]);
         let room = |v: Vector3<f64>| Vector3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z);
         let step = room(Vector3::new(moved.motion.x_m, moved.motion.y_m, moved.motion.theta_rad));
         for at in 0..3 {
@@ -398,9 +405,10 @@ impl<'f> PartialFilter<'f> {
     /// not where the filter has it, which starts anew there.
     fn update_gated(
         &mut self,
-        (number, of, by_terms): (usize, &Observation, &[Vector3<f64>]),
-        gate: OutlierGate,
-        model: &Model,
+        number: usize,
+        of: &Observation,
+        by_terms: &[Vector3<f64>],
+        pass: &PartialPass<'_>,
         columns: usize,
         sums: &mut Sums<'_>,
     ) {
@@ -409,13 +417,13 @@ impl<'f> PartialFilter<'f> {
             Quantity::WallDistance(_) => Some(1),
             _ => None,
         };
-        let mut is_taken = self.update((of, by_terms), gate, model, columns, sums);
+        let mut is_taken = self.update(of, by_terms, pass, columns, sums);
         if let Some(in_a_row) = kind.map(|kind| &mut self.wall_outliers_in_a_row[kind]) {
             *in_a_row = if is_taken { 0 } else { *in_a_row + 1 };
             if *in_a_row >= COMMON.restart_after_outliers {
                 *in_a_row = 0;
                 self.start_anew(of.to);
-                is_taken = self.update((of, by_terms), gate, model, columns, sums);
+                is_taken = self.update(of, by_terms, pass, columns, sums);
             }
         }
         if !is_taken {
@@ -426,12 +434,13 @@ impl<'f> PartialFilter<'f> {
     /// Takes an observation, to whose pose terms add `by_terms`; says whether it passes the gate.
     fn update(
         &mut self,
-        (of, by_terms): (&Observation, &[Vector3<f64>]),
-        gate: OutlierGate,
-        model: &Model,
+        of: &Observation,
+        by_terms: &[Vector3<f64>],
+        pass: &PartialPass<'_>,
         columns: usize,
         sums: &mut Sums<'_>,
     ) -> bool {
+        let model = pass.model;
         if let Quantity::GyroTurn { dt_s } = of.quantity {
             self.covariance[(bias_at(), bias_at())] += self.segment.bias_walk * dt_s;
         }
@@ -442,7 +451,7 @@ impl<'f> PartialFilter<'f> {
         v -= by_terms.iter().zip(&model.term_values).map(|(by, size)| by * size).sum::<f64>();
         let ph = &self.covariance * &row;
         let s = row.dot(&ph) + of.variance;
-        if gate == OutlierGate::On && v * v > PARTIAL.partial_outlier_chi_square * s {
+        if pass.gate == OutlierGate::On && v * v > PARTIAL.partial_outlier_chi_square * s {
             return false;
         }
         let gain = &ph / s;

@@ -83,6 +83,16 @@ impl TakenPoses<'_> {
     }
 }
 
+/// A pose of the drive's centre in the filter's state.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct StatePose {
+    pub(crate) pose: Pose,
+    /// Where it stands in the state.
+    pub(crate) at: usize,
+    /// Of the state.
+    pub(crate) size: usize,
+}
+
 /// A measured pose as the filter takes it, in the room.
 pub(crate) struct PoseUpdate {
     /// Derivatives of its coordinates by the state.
@@ -99,13 +109,15 @@ pub(crate) struct PoseUpdate {
 }
 
 impl PoseUpdate {
-    /// Of a measured pose at a place of a segment, where the drive's centre stands at `pose` by the filter;
-    /// the pose stands in a state of some size `at` an index. What terms add comes from their state in force.
+    /// Of a measured pose at a place of a segment, where the drive's centre stands at a pose by the filter.
+    /// What terms add comes from their state in force.
     pub(crate) fn of(
         measured: &MeasuredPose,
-        (partial, place): (&PartialSegment<'_>, usize),
-        (pose, at, size): (Pose, usize, usize),
-        (model, noise): (&Model, &Noise),
+        partial: &PartialSegment<'_>,
+        place: usize,
+        StatePose { pose, at, size }: StatePose,
+        model: &Model,
+        noise: &Noise,
         propagator: &mut Propagator<'_, '_>,
     ) -> Self {
         let segment = &partial.segment;
@@ -123,7 +135,7 @@ impl PoseUpdate {
         let (moved, by_latency) = (velocity(0.5 * latency_s), velocity(latency_s));
         let turned_back_rad = latency_s * moved.z;
         let (moved, by_latency) = (turned_by(moved, -0.5 * turned_back_rad), turned_by(by_latency, -turned_back_rad));
-        let by_terms = instrument_by_terms((partial, place), pose, measured.t_s, propagator);
+        let by_terms = instrument_by_terms(partial, place, pose, measured.t_s, propagator);
         let of_terms: Vector3<f64> = model.term_values.iter().zip(&by_terms).map(|(size, by)| *by * *size).sum();
         let ahead = mounted - moved * latency_s + of_terms;
         let expected = Vector3::new(pose.x_m, pose.y_m, pose.theta_rad) + ahead;
@@ -164,7 +176,8 @@ impl PoseUpdate {
 /// segment where the drive's centre stands at `pose`, in the room. What they add comes from their state in
 /// force.
 pub(crate) fn instrument_by_terms(
-    (partial, place): (&PartialSegment<'_>, usize),
+    partial: &PartialSegment<'_>,
+    place: usize,
     pose: Pose,
     t_s: f64,
     propagator: &mut Propagator<'_, '_>,

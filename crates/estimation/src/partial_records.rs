@@ -85,16 +85,24 @@ struct Stretch<'a> {
     places: Vec<Place>,
 }
 
-/// The partial measurements of a run, with its `poses`: the segments of these, the first of which has the
-/// index `first`. A run with displacements gives none: these hold the wheels' errors as well, and a
+/// The segments of a run's poses.
+#[derive(Clone, Copy)]
+pub(crate) struct PosesOfRun<'p, 'a> {
+    pub(crate) segments: &'p [Segment<'a>],
+    /// The index of the first of them.
+    pub(crate) first: usize,
+}
+
+/// The partial measurements of a run, with its `poses`. A run with displacements gives none: these hold the wheels' errors as well, and a
 /// likelihood that counts them twice would be too sure.
 pub(crate) fn partial_segments<'a>(
     run: &RunView<'a>,
     base: &Segment<'a>,
-    (poses, first): (&[Segment<'a>], usize),
+    PosesOfRun { segments: poses, first }: PosesOfRun<'_, 'a>,
     track: &WheelAngleInterpolator<'_>,
     nominal: &Model,
-    (gyro, lidar): (&GyroSettings, Option<LidarExtrinsics>),
+    gyro: &GyroSettings,
+    lidar: Option<LidarExtrinsics>,
 ) -> Vec<PartialSegment<'a>> {
     let shows_distances = lidar.is_none() || turned_rad(track, nominal) >= MIN_LIDAR_TURN_RAD;
     let (mut timed, walls) = tape_and_walls(run.run(), shows_distances);
@@ -156,7 +164,7 @@ pub(crate) fn partial_segments<'a>(
             .collect();
         // Between equals the order of the files.
         observations.sort_by_key(|of| of.to);
-        let walls = WallStart::of((&segment, &places, &observations), walls, nominal, lidar);
+        let walls = WallStart::of(&segment, &places, &observations, walls, nominal, lidar);
         let bias_walk = gyro.stated.bias_walk_radps_per_sqrt_s.unwrap_or(PARTIAL.bias_walk_radps).powi(2);
         PartialSegment { segment, places, observations, walls, bias_walk }
     };

@@ -18,7 +18,7 @@ use crate::model::{Column, Model};
 use crate::noise::Noise;
 use crate::noise_score::{NoiseScore, TimingScore};
 use crate::normal_equations::NormalEquations;
-use crate::partial_filter::{Filtered, filter_partial};
+use crate::partial_filter::{Filtered, PartialPass, filter_partial};
 use crate::partial_observation::Quantity;
 use crate::partial_poses::TakenPoses;
 use crate::partial_records::PartialSegment;
@@ -181,10 +181,10 @@ pub(crate) fn pass(
     let with_partial = selections.iter().zip(&outliers).filter(|_| records.has_partial());
     for (phase, (selection, rejected)) in with_partial.enumerate() {
         let poses = TakenPoses::of(&records.segments, free_headings, &selection.propagations, rejected);
-        let part = (records, selection, *weight);
         // Partial measurements have derivatives by all columns.
         let products = Products::of(Layout::whole(parameters), pass_options.parts, free);
-        let found = add_partial(&mut result, part, (&poses, pass_options.gate), (model, noise), &products, terms);
+        let pass = PartialPass { poses: &poses, gate: pass_options.gate, model, noise, products: &products };
+        let found = add_partial(&mut result, records, selection, *weight, pass, terms);
         if phase == 0 {
             result.partial_outliers = found;
         }
@@ -373,10 +373,10 @@ impl SegmentFilter<'_, '_> {
 /// scale to that of the first run which has one. Gives the outliers.
 fn add_partial(
     result: &mut Pass,
-    (records, selection, weight): (&Records<'_>, &Selection, f64),
-    (poses, gate): (&TakenPoses<'_>, OutlierGate),
-    (model, noise): (&Model, &Noise),
-    products: &Products,
+    records: &Records<'_>,
+    selection: &Selection,
+    weight: f64,
+    pass: PartialPass<'_>,
     terms: &[Box<dyn ModelTerm>],
 ) -> Vec<(usize, usize)> {
     let columns = Column::BASE.len() + terms.iter().map(|term| term.parameters().len()).sum::<usize>();
@@ -384,12 +384,12 @@ fn add_partial(
     let filtered = |gate: OutlierGate| -> Vec<Option<Filtered>> {
         let of_segment = |terms: &mut Vec<Box<dyn ModelTerm>>,
                           of: (&PartialSegment<'_>, &Option<Vec<PropagationInterval>>)| {
-            Some(filter_partial(of.0, (of.1.as_ref()?, gate), poses, (model, noise), products, terms))
+            Some(filter_partial(of.0, of.1.as_ref()?, &PartialPass { gate, ..pass }, terms))
         };
         let segments = records.partial.par_iter().zip(&selection.partial);
         segments.map_init(|| terms.to_vec(), of_segment).collect()
     };
-    let mut found = filtered(gate);
+    let mut found = filtered(pass.gate);
     if most_of_a_kind_are_outliers(&records.partial, &found) {
         found = filtered(OutlierGate::Off);
     }
@@ -408,8 +408,8 @@ fn add_partial(
         if let Some(precision) = prior.take_if(|_| partial.has_gyro()) {
             let scale = Column::GyroScale.index();
             result.runs[at].information[(scale, scale)] += weight * precision;
-            result.runs[at].gradient[scale] += weight * precision * model.gyro_scale;
-            result.runs[at].chi_square += weight * precision * model.gyro_scale.powi(2);
+            result.runs[at].gradient[scale] += weight * precision * pass.model.gyro_scale;
+            result.runs[at].chi_square += weight * precision * pass.model.gyro_scale.powi(2);
         }
     }
     all_outliers

@@ -215,9 +215,9 @@ impl<'f, 'a> Propagator<'f, 'a> {
 
     /// What the counts say of the motion since the last measurement, where it is asked for, and forgets it.
     #[inline(always)]
-    pub(crate) fn sample(&mut self, pose: Pose, of: (usize, usize)) -> Option<KinematicSample> {
+    pub(crate) fn sample(&mut self, pose: Pose, segment: usize, measurement: usize) -> Option<KinematicSample> {
         let world_from_body = self.run_from_chain * pose;
-        self.sampler.as_mut()?.sample(of, world_from_body)
+        self.sampler.as_mut()?.sample(segment, measurement, world_from_body)
     }
 
     #[inline(always)]
@@ -228,7 +228,8 @@ impl<'f, 'a> Propagator<'f, 'a> {
                 self.segment.info.start_s.unwrap_or(0.0),
                 intervals,
                 self.model,
-                (self.wheel_rad, self.session_m),
+                self.wheel_rad,
+                self.session_m,
             );
         }
     }

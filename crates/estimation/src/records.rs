@@ -15,7 +15,7 @@ use rules::Rule;
 use crate::model::{Column, Model};
 use crate::noise::NoisePrior;
 use crate::noise_shape::NoiseShape;
-use crate::partial_records::{GyroSettings, PartialSegment, partial_segments};
+use crate::partial_records::{GyroSettings, PartialSegment, PosesOfRun, partial_segments};
 use crate::poses_between_rows::{take_one_for_each_row, take_those_near_rows};
 use crate::segment::{MeasuredPose, Segment, Start};
 use crate::settings::{COMMON, PARTIAL, TIME_TOLERANCE_S};
@@ -106,9 +106,9 @@ impl<'a> Records<'a> {
                 let (before, partial_before) = (records.segments.len(), records.partial.len());
                 records.segments.extend(segments);
                 if let (Some((base, track)), Some(nominal)) = (base, start) {
-                    let poses = (&records.segments[before..], before);
+                    let poses = PosesOfRun { segments: &records.segments[before..], first: before };
                     let lidar = session.truth_noise.lidar;
-                    let partial = partial_segments(run, base, poses, track, nominal, (&gyro, lidar));
+                    let partial = partial_segments(run, base, poses, track, nominal, &gyro, lidar);
                     records.partial.extend(partial);
                 }
                 if (records.segments.len(), records.partial.len()) == (before, partial_before) {

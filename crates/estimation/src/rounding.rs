@@ -15,7 +15,7 @@
 //! both rows, and most in the middle. That error is carried in the same way, to the next measurement or the
 //! row's end, whichever comes first. Measurements of one row are taken to have independent ones.
 
-use kinematics::{Pose, Wheels, sin_cos};
+use kinematics::{Pose, Rotation, Wheels};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::covariances::{Covariance, Covariances};
@@ -39,7 +39,7 @@ enum Carries {
         own: OwnVariance,
         pose: Pose,
         covariance: Covariance,
-        heading: Option<(f64, f64)>,
+        heading: Option<Rotation>,
         by_noise: [[f64; NOISES]; 3],
     },
 }
@@ -89,12 +89,12 @@ impl PoseVariance {
     /// Q in the room, for a heading.
     #[inline(always)]
     pub(crate) fn in_room(&self, theta_rad: f64) -> Matrix3<f64> {
-        self.turned(sin_cos(theta_rad))
+        self.turned(Rotation::by(theta_rad))
     }
 
     /// The same, by the heading's sine and cosine.
     #[inline(always)]
-    fn turned(&self, (sin, cos): (f64, f64)) -> Matrix3<f64> {
+    fn turned(&self, Rotation { sin, cos }: Rotation) -> Matrix3<f64> {
         let (along, with) = (self.along_m2, self.covariance_m_rad);
         Matrix3::new(
             along * cos * cos,
@@ -155,7 +155,8 @@ impl Rounding {
         state: &mut FilterState<'_>,
         variance: [f64; 2],
         interpolated_rad2: Wheels<f64>,
-        (model, heading): (&Model, (f64, f64)),
+        model: &Model,
+        heading: Rotation,
     ) {
         if !matches!(self.carries, Carries::OfCounts) {
             return;
@@ -213,7 +214,7 @@ impl Rounding {
             }
             Carries::SinceMeasurement { own, pose, covariance, heading, by_noise } => {
                 let covariance = covariance.matrix(0);
-                let heading = heading.unwrap_or_else(|| sin_cos(pose.theta_rad));
+                let heading = heading.unwrap_or_else(|| Rotation::by(pose.theta_rad));
                 let entered = covariance + own.pose.turned(heading);
                 // Nothing was rounded, or nothing is known of the pose: no measurement says anything of it.
                 let Some(inverse) = entered.try_inverse() else { return };
@@ -226,7 +227,7 @@ impl Rounding {
                     state.pose.theta_rad - pose.theta_rad,
                 );
                 if noise_score {
-                    self.leave_noise(state, (&gain, &inverse), (&learnt, moved), &by_noise);
+                    self.leave_noise(state, &gain, &inverse, &learnt, moved, &by_noise);
                 }
                 let step = gain * moved;
                 *state.pose = Pose::new(pose.x_m + step.x, pose.y_m + step.y, pose.theta_rad + step.z);
@@ -244,8 +245,10 @@ impl Rounding {
     fn leave_noise(
         &self,
         state: &mut FilterState<'_>,
-        (gain, inverse): (&Matrix3<f64>, &Matrix3<f64>),
-        (learnt, moved): (&Matrix3<f64>, Vector3<f64>),
+        gain: &Matrix3<f64>,
+        inverse: &Matrix3<f64>,
+        learnt: &Matrix3<f64>,
+        moved: Vector3<f64>,
         by_noise: &[[f64; NOISES]; 3],
     ) {
         let left = Matrix3::identity() - gain;

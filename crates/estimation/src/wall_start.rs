@@ -54,7 +54,9 @@ impl WallStart {
     /// the distances alone, by least squares from several directions. The lidar's yaw is near the stated one,
     /// or it is the best of several.
     pub(crate) fn of(
-        (segment, places, observations): (&Segment<'_>, &[Place], &[Observation]),
+        segment: &Segment<'_>,
+        places: &[Place],
+        observations: &[Observation],
         walls: usize,
         nominal: &Model,
         lidar: Option<LidarExtrinsics>,

@@ -109,12 +109,14 @@ impl<'a> WheelAngleInterpolator<'a> {
             }
         };
         let continuous = run.info().continuous;
-        let drive = robot.geometry().map_or((1.0, Wheels::both(1.0)), |of| (of.wheel_separation_m(), of.m_per_rad()));
+        let drive = robot.geometry();
+        let (separation_m, m_per_rad) =
+            drive.map_or((1.0, Wheels::both(1.0)), |of| (of.wheel_separation_m(), of.m_per_rad()));
         // Of stamps that are exact but for a few, those few are true.
         let has_period = continuous && are_inexact(&odometry.t_s);
         let period = if has_period { odometry.t_s.sampling_period() } else { None };
         let late_s = period.map_or_else(|| vec![0.0; odometry.t_s.len()], |period| period.late_s.clone());
-        let rates = WheelRates::of((&odometry.t_s, &late_s), &turn_rad, quantum_rad, drive, continuous);
+        let rates = WheelRates::of(&odometry.t_s, &late_s, &turn_rad, quantum_rad, separation_m, m_per_rad, continuous);
         // Stamps that do not tell the tick do not tell by how many periods they are late.
         let most_s = period.filter(|period| !period.is_certain()).map_or(f64::INFINITY, |period| period.period_s);
         let late_s = if continuous {

@@ -44,10 +44,12 @@ impl WheelRates {
     /// The rates of a run, whose stamps are so late against a regular beat. `quantum_rad` is what a count
     /// stands for, where counts were recorded.
     pub(crate) fn of(
-        (t_s, late_s): (&[f64], &[f64]),
+        t_s: &[f64],
+        late_s: &[f64],
         turn_rad: &Wheels<Vec<f64>>,
         quantum_rad: Wheels<f64>,
-        (separation_m, m_per_rad): (f64, Wheels<f64>),
+        separation_m: f64,
+        m_per_rad: Wheels<f64>,
         continuous: bool,
     ) -> Self {
         let wrong_share = 1.0 - share_of_true_stamps(t_s, turn_rad);

@@ -2,7 +2,7 @@
 //! before, and inputs that are followed by the counts until they are told again.
 
 use effects::Input;
-use kinematics::{Pose, Wheels};
+use kinematics::{Increment, Pose, Wheels};
 
 use crate::settings::{LATENESS_KEPT, MAX_JITTER_SHARE, PERIOD_INTERVALS};
 
@@ -61,8 +61,10 @@ impl FollowedInputs {
         logged: &OnBoardInputs,
         before: Pose,
         turned_rad: Wheels<f64>,
-        (distance_m, turn_rad, dt_s): (f64, f64, f64),
+        moved: Increment,
+        dt_s: f64,
     ) -> KnownInputs {
+        let Increment { distance_m, turn_rad } = moved;
         let from = |logged: Option<f64>, known: Option<f64>, by: f64| logged.map(|logged| logged - by).or(known);
         let wheel_rad = Wheels::from_sides(|side| from(logged.wheel_rad[side], self.wheel_rad[side], turned_rad[side]));
         self.wheel_rad = Wheels::from_sides(|side| wheel_rad[side].map(|from_rad| from_rad + turned_rad[side]));
@@ -166,11 +168,11 @@ mod tests {
     #[test]
     fn what_was_told_once_is_followed() {
         let mut followed = FollowedInputs::default();
-        let step = (0.1, 0.2, 0.02);
+        let (step, dt_s) = (Increment { distance_m: 0.1, turn_rad: 0.2 }, 0.02);
         let at = |theta_rad: f64| Pose::new(0.0, 0.0, theta_rad);
         let turned = Wheels { left: 1.0, right: 2.0 };
         let nothing = OnBoardInputs::default();
-        let known = followed.after(&nothing, at(0.0), turned, step);
+        let known = followed.after(&nothing, at(0.0), turned, step, dt_s);
         assert!(Input::ALL.iter().filter(|input| known.has(**input)).eq([&Input::WheelAngles]));
         assert_eq!(known.wheel_rad, Wheels::both(None));
         let logged = OnBoardInputs {
@@ -180,11 +182,11 @@ mod tests {
             session_s: Some(60.02),
             session_m: Some(7.1),
         };
-        let known = followed.after(&logged, at(0.2), turned, step);
+        let known = followed.after(&logged, at(0.2), turned, step, dt_s);
         assert_eq!(known.wheel_rad, Wheels { left: Some(4.0), right: None });
         let near = |found: Option<f64>, expected: f64| found.is_some_and(|found| (found - expected).abs() < 1e-12);
         assert!(near(known.room_heading_rad, 1.0) && near(known.session_s, 60.0) && near(known.session_m, 7.0));
-        let known = followed.after(&nothing, at(0.5), turned, step);
+        let known = followed.after(&nothing, at(0.5), turned, step, dt_s);
         assert_eq!((known.wheel_rad.left, known.payload_kg), (Some(5.0), Some(3.0)));
         assert!(near(known.room_heading_rad, 1.3) && near(known.session_s, 60.02) && near(known.session_m, 7.1));
     }

@@ -106,9 +106,10 @@ impl OnBoardOdometry {
         let travel_m = self.m_per_count.zip_with(since, |m_per_count, counts| m_per_count * counts);
         let speed_m_s = travel_m.map(|travel_m| if dt_s > 0.0 { travel_m / dt_s } else { 0.0 });
         let before = self.pose;
-        let Increment { distance_m, turn_rad } = Increment::from_travel(travel_m, self.wheel_separation_m);
+        let increment = Increment::from_travel(travel_m, self.wheel_separation_m);
+        let Increment { distance_m, turn_rad } = increment;
         let turned_rad = since.map(|counts| self.rad_per_count * counts);
-        let known = self.inputs.after(logged, before, turned_rad, (distance_m, turn_rad, dt_s));
+        let known = self.inputs.after(logged, before, turned_rad, increment, dt_s);
         if let (Some(payload_kg), Some(key)) = (known.payload_kg, Input::Payload.covariate()) {
             self.run.covariates.insert(key.to_owned(), payload_kg);
         }

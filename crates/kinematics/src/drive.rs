@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use crate::elementary::{Branching, Elementary};
 use crate::trig::sin_cos;
-use crate::{Frame, Pose, Wheels};
+use crate::{Frame, Pose, Rotation, Wheels};
 
 /// Why a drive geometry or a count scale is not one.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -173,7 +173,7 @@ impl Increment {
         before_from_after.x_m += cos * along_m - sin * across_m;
         before_from_after.y_m += sin * along_m + cos * across_m;
         // The whole turn's from the half's: 2·sin·cos, 1 − 2·sin².
-        Frame::with_heading(before_from_after, (2.0 * sin * cos, 1.0 - 2.0 * sin * sin))
+        Frame::with_heading(before_from_after, Rotation { sin: 2.0 * sin * cos, cos: 1.0 - 2.0 * sin * sin })
     }
 
     /// The arc's end, and sine and cosine of half its turn.

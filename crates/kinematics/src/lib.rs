@@ -34,6 +34,6 @@ pub use dead_reckoning::{Count, DeadReckoning, Odometry, Rule};
 pub use drive::{DriveGeometry, GeometryError, Increment, Twist};
 pub use elementary::{BranchFree, Branching, Elementary, Formula, by_lanes};
 pub use instruction_set::{InstructionSet, Kernel};
-pub use pose::{Frame, Point, Pose};
+pub use pose::{Frame, Point, Pose, Rotation};
 pub use trig::{atan2, sin_cos, sinc};
 pub use wheels::{Side, Wheels};

@@ -3,6 +3,7 @@
 use std::ops::Mul;
 
 use crate::elementary::{Branching, Elementary};
+use crate::trig::sin_cos;
 
 /// A point in some frame, metres.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -94,6 +95,25 @@ impl Mul<Point> for Pose {
     }
 }
 
+/// A rotation of the plane, by the sine and cosine of its angle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rotation {
+    /// Sine of the angle.
+    pub sin: f64,
+    /// Its cosine.
+    pub cos: f64,
+}
+
+impl Rotation {
+    /// By an angle.
+    #[inline(always)]
+    #[must_use]
+    pub fn by(angle_rad: f64) -> Self {
+        let (sin, cos) = sin_cos(angle_rad);
+        Self { sin, cos }
+    }
+}
+
 /// A pose `a_from_b` with the sine and cosine of its heading at hand: several products from the left cost one
 /// sine and cosine, and give the same bits as
 /// [`Pose`].
@@ -107,7 +127,7 @@ pub struct Frame {
 impl Frame {
     /// A pose whose heading's sine and cosine are known.
     #[inline]
-    pub(crate) const fn with_heading(a_from_b: Pose, (sin, cos): (f64, f64)) -> Self {
+    pub(crate) const fn with_heading(a_from_b: Pose, Rotation { sin, cos }: Rotation) -> Self {
         Self { a_from_b, sin, cos }
     }
 

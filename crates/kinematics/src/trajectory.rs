@@ -128,7 +128,8 @@ impl Odometry {
     /// When the two columns differ in length.
     pub fn for_each_pose_with_covariance<C: Count>(
         &self,
-        (start, covariance): (Pose, OdometryCovariance),
+        start: Pose,
+        covariance: OdometryCovariance,
         counts: Wheels<&[C]>,
         noise: &WheelNoise,
         mut visit: impl FnMut(Pose, &OdometryCovariance),

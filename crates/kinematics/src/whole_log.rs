@@ -143,7 +143,7 @@ impl<C: Count, S: Sink> Kernel for Walk<'_, C, S> {
         let (mut left, mut right) = (left.chunks_exact(GROUPS), right.chunks_exact(GROUPS));
         let mut upcoming = counts.map(|counts| counts.get(READ_PREFETCH_STEPS..).unwrap_or(&[]));
         for (left, right) in (&mut left).zip(&mut right) {
-            self.block(&mut columns, (Wheels { left, right }, upcoming), BLOCK);
+            self.block(&mut columns, Wheels { left, right }, upcoming, BLOCK);
             upcoming = upcoming.map(|counts| counts.get(BLOCK..).unwrap_or(&[]));
         }
         // The groups that are left, and the last filled up by standing still.
@@ -166,7 +166,7 @@ impl<C: Count, S: Sink> Kernel for Walk<'_, C, S> {
         if steps > 0 {
             let used = ..steps.div_ceil(GROUP);
             let groups = Wheels { left: &groups.left[used], right: &groups.right[used] };
-            self.block(&mut columns, (groups, Wheels::both(&[])), steps);
+            self.block(&mut columns, groups, Wheels::both(&[]), steps);
         }
         self.write_waiting(&mut columns);
         self.one_by_one(rest);
@@ -396,7 +396,7 @@ impl<C: Count, S: Sink> Walk<'_, C, S> {
     /// and its poses are written, group by group: the memory writes while the processor computes. `upcoming`
     /// are the counts whose memory is asked for meanwhile.
     #[inline(always)]
-    fn block(&mut self, columns: &mut Columns, (counts, upcoming): (Wheels<&[[C; GROUP]]>, Wheels<&[C]>), used: usize) {
+    fn block(&mut self, columns: &mut Columns, counts: Wheels<&[[C; GROUP]]>, upcoming: Wheels<&[C]>, used: usize) {
         let (mut before, mut is_within) = (self.state.counts, true);
         for (group, (left, right)) in counts.left.iter().zip(counts.right).enumerate() {
             for upcoming in [upcoming.left, upcoming.right] {

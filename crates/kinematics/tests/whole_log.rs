@@ -211,7 +211,7 @@ fn covariance_along_a_log() {
     let noise = WheelNoise { sigma_m_per_sqrt_m: Wheels { left: 1e-3, right: 1.7e-3 } };
     let before = OdometryCovariance::starting_at(Matrix3::identity() * 1e-6);
     let (mut rows, mut along) = (Vec::new(), before);
-    odometry.for_each_pose_with_covariance((START, before), columns, &noise, |pose, covariance| {
+    odometry.for_each_pose_with_covariance(START, before, columns, &noise, |pose, covariance| {
         rows.push(bits(pose));
         along = *covariance;
     });

@@ -85,6 +85,15 @@ pub(super) struct Path1kHz {
     pub(super) samples: Vec<Sample>,
 }
 
+/// The geometry that a robot has.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TrueGeometry {
+    pub(super) base_m: f64,
+    pub(super) radius_m: [f64; 2],
+    /// Of the wheels that are not round.
+    pub(super) phase_rad: f64,
+}
+
 pub(super) struct World {
     pub(super) at: [f64; 3],
     pub(super) wheels_rad: [f64; 2],
@@ -97,8 +106,9 @@ impl World {
     pub(super) fn drive(
         &mut self,
         legs: &[Part],
-        (robot, number): (&PlainRobot, usize),
-        (base_m, radius_m, phase_rad): (f64, [f64; 2], f64),
+        robot: &PlainRobot,
+        number: usize,
+        TrueGeometry { base_m, radius_m, phase_rad }: TrueGeometry,
         draws: &mut Draws,
     ) -> Path1kHz {
         const DT_S: f64 = 1e-3;

@@ -67,7 +67,9 @@ impl PlainRobot {
 
     pub(super) fn log_rows(
         &self,
-        (number, id, since_s): (usize, &str, f64),
+        number: usize,
+        id: &str,
+        since_s: f64,
         path: &Path1kHz,
         odometry: &mut String,
         draws: &mut Draws,
@@ -102,7 +104,7 @@ impl PlainRobot {
             let is_unchanged = self.logs_changes_alone && last_counts == Some(counts);
             // A row that is lost had the speed of its own time.
             let row = (1e-3 * step as f64, counts);
-            let since = last_row.replace(row).unwrap_or((row.0 - 1e-3 * every as f64, counts));
+            let (last_row_s, last_row_counts) = last_row.replace(row).unwrap_or((row.0 - 1e-3 * every as f64, counts));
             let share =
                 if self.speed_filter_s > 0.0 { 1.0 - (-1e-3 * every as f64 / self.speed_filter_s).exp() } else { 1.0 };
             let now_m_s = if self.has_rates_of_instants {
@@ -110,7 +112,7 @@ impl PlainRobot {
                 let [last, next] = beside.map(|at| path.samples[at].wheels_rad);
                 [0, 1].map(|wheel| 0.5e3 * 0.08 * self.scale * (next[wheel] - last[wheel]))
             } else {
-                self.speeds_m_s(row, since)
+                self.speeds_m_s(row.0, counts, last_row_s, last_row_counts)
             };
             filtered_m_s = [0, 1].map(|wheel| filtered_m_s[wheel] + share * (now_m_s[wheel] - filtered_m_s[wheel]));
             if self.knows_wheels {
@@ -129,7 +131,7 @@ impl PlainRobot {
     }
 
     /// Speeds of the wheels by the times and counts of two rows.
-    fn speeds_m_s(&self, (t_s, counts): (f64, [f64; 2]), (last_s, last_counts): (f64, [f64; 2])) -> [f64; 2] {
+    fn speeds_m_s(&self, t_s: f64, counts: [f64; 2], last_s: f64, last_counts: [f64; 2]) -> [f64; 2] {
         let m_per_count = 0.08 * self.scale * TAU / self.ticks_per_rev;
         [0, 1].map(|wheel| m_per_count * (counts[wheel] - last_counts[wheel]) / (t_s - last_s))
     }

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::draws::Draws;
-use crate::drive::{Part, World, programs};
+use crate::drive::{Part, TrueGeometry, World, programs};
 use crate::robot::{PlainRobot, Records};
 
 impl PlainRobot {
@@ -53,15 +53,16 @@ impl PlainRobot {
             };
             programs.iter().enumerate().map(of).collect()
         };
+        let geometry = TrueGeometry { base_m, radius_m, phase_rad };
         let mut world = World { at: [0.0; 3], wheels_rad: [0.0; 2], ahead_m: [0.0; 2] };
         for (number, (id, protocol, legs)) in runs.iter().enumerate() {
             let start_s = 60.0 * number as f64;
             write!(described, "[[run]]\nid = \"{id}\"\nprotocol = \"{protocol}\"\nstart_s = {start_s}\n")
                 .expect("text");
             world.at = [draws.normal(), draws.normal(), PI * (2.0 * draws.uniform() - 1.0)];
-            let path = world.drive(legs, (self, number), (base_m, radius_m, phase_rad), &mut draws);
+            let path = world.drive(legs, self, number, geometry, &mut draws);
             let since_s = if self.clock_runs_on { start_s } else { 0.0 };
-            self.log_rows((number, id, since_s), &path, &mut odometry, &mut draws);
+            self.log_rows(number, id, since_s, &path, &mut odometry, &mut draws);
             self.log_truth(number, id, &path, &mut truth, &mut draws);
         }
         let sigma = |sigma: f64| if sigma > 0.0 { sigma } else { 0.0 };

@@ -28,7 +28,7 @@ pub fn write(corpus: &Path, seed: u64, number: u64, knows_wheels: bool) -> Resul
         return Ok(());
     }
     let recorded = if knows_wheels { Recorded::OfTheWheels } else { Recorded::AsLogged };
-    let logs = case_logs((Scope::Whole, seed, number), recorded).map_err(|error| error.to_string())?;
+    let logs = case_logs(Scope::Whole, seed, number, recorded).map_err(|error| error.to_string())?;
     let Ok(logs) = logs else { return Ok(()) };
     write_log(&folder, &answer(&logs, seed), &logs.sessions, &logs.elsewhere)
 }

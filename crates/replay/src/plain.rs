@@ -9,8 +9,9 @@ use crate::answer::{ANSWER, Answer, Cause, Question, geometry_m};
 
 /// The folder of a robot of a kind below a corpus.
 #[must_use]
-pub fn kind_name((name, ..): Kind, seed: u64) -> String {
-    let words: String = name.chars().map(|letter| if letter.is_ascii_alphanumeric() { letter } else { '-' }).collect();
+pub fn kind_name(kind: Kind, seed: u64) -> String {
+    let words: String =
+        kind.0.chars().map(|letter| if letter.is_ascii_alphanumeric() { letter } else { '-' }).collect();
     format!("ordinary/{words}-{seed}")
 }
 

@@ -17,7 +17,7 @@ pub(crate) struct Rect {
 }
 
 impl Rect {
-    pub(crate) fn contains(&self, (x, y): (f64, f64)) -> bool {
+    pub(crate) fn contains(&self, x: f64, y: f64) -> bool {
         (self.x..=self.x + self.w).contains(&x) && (self.y..=self.y + self.h).contains(&y)
     }
 }
@@ -39,7 +39,7 @@ impl Frame {
         self.rect.y + self.rect.h * (1.0 - self.y.fraction(value))
     }
 
-    pub(crate) fn px(&self, (x, y): (f64, f64)) -> (f64, f64) {
+    pub(crate) fn px(&self, x: f64, y: f64) -> (f64, f64) {
         (self.x_px(x), self.y_px(y))
     }
 

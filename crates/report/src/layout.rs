@@ -92,7 +92,7 @@ impl Layout {
             let place = |(panel, &(left, right)): (&Panel, &(f64, f64))| {
                 let cell = (x, left + frame_w + right);
                 x += cell.1 + COLUMN_GAP_PX;
-                PanelLayout::of(panel, font, cell, (left, right))
+                PanelLayout::of(panel, font, cell, left, right)
             };
             let mut placed: Vec<PanelLayout> = row.iter().zip(&margins).map(place).collect();
             let most = |of: &dyn Fn(&PanelLayout) -> f64| placed.iter().map(of).fold(0.0, f64::max);
@@ -176,7 +176,7 @@ fn frame(panel: &Panel, width: f64) -> Frame {
 
 impl PanelLayout {
     /// A panel with the upper end of its frame at y = 0.
-    fn of(panel: &Panel, font: &Font, cell: (f64, f64), (left, right): (f64, f64)) -> Self {
+    fn of(panel: &Panel, font: &Font, cell: (f64, f64), left: f64, right: f64) -> Self {
         let mut frame = frame(panel, cell.1 - left - right);
         frame.rect.x = cell.0 + left + (cell.1 - left - right - frame.rect.w) / 2.0;
         let legend = Legend::of(panel, &frame, font, cell.1);

@@ -90,7 +90,7 @@ impl Legend {
         let free = |&&(x, y): &&(f64, f64)| {
             let with_margin =
                 Rect { x: x - CLEAR_PX, y: y - CLEAR_PX, w: width + 2.0 * CLEAR_PX, h: height + 2.0 * CLEAR_PX };
-            !covered.iter().any(|&point| with_margin.contains(point))
+            !covered.iter().any(|&point| with_margin.contains(point.0, point.1))
         };
         let place = places.iter().find(free)?;
         let mut entries = entries.to_vec();

@@ -3,7 +3,7 @@
 use svg::node::element::{Circle, Group, Line, Path, Rectangle, Title};
 
 use crate::figure::Figure;
-use crate::frame::Frame;
+use crate::frame::{Frame, Rect};
 use crate::panel::Panel;
 use crate::series::{Colour, Marks, Series};
 
@@ -98,7 +98,7 @@ fn path(points: &[(f64, f64)], closed: bool) -> String {
 }
 
 fn near(frame: &Frame, point: (f64, f64)) -> (f64, f64) {
-    let (x, y) = frame.px(point);
+    let (x, y) = frame.px(point.0, point.1);
     (x.clamp(-FAR_PX, FAR_PX), y.clamp(-FAR_PX, FAR_PX))
 }
 
@@ -191,7 +191,7 @@ pub(crate) fn covered_points(panel: &Panel, frame: &Frame) -> Vec<(f64, f64)> {
             Marks::VerticalLine { x } => cover((frame.x_px(*x), rect.y), (frame.x_px(*x), rect.y + rect.h)),
         }
     }
-    covered.retain(|&point| rect.contains(point));
+    covered.retain(|&point| rect.contains(point.0, point.1));
     covered
 }
 
@@ -214,11 +214,11 @@ pub(crate) fn drawn(series: &Series, style: Style, frame: &Frame) -> Group {
                 if !(frame.x.contains(x) && frame.y.contains(y)) {
                     continue;
                 }
-                let (x_px, y_px) = frame.px((x, y));
+                let (x_px, y_px) = frame.px(x, y);
                 if let Some(errors) = y_error {
                     group = error_bar(group, x_px, whisker(frame, y, errors[k]), style);
                 }
-                group = marker(group, (x_px, y_px), radius, opacity, style);
+                group = marker(group, x_px, y_px, radius, opacity, style);
             }
             group
         }
@@ -231,7 +231,7 @@ pub(crate) fn drawn(series: &Series, style: Style, frame: &Frame) -> Group {
         Marks::Bars { edges, heights } => edges.windows(2).zip(heights).fold(group, |group, (edge, &height)| {
             let (left, top) = near(frame, (edge[0], height.max(0.0)));
             let (right, bottom) = near(frame, (edge[1], height.min(0.0)));
-            bar(group, (left, top, right - left, bottom - top), style)
+            bar(group, Rect { x: left, y: top, w: right - left, h: bottom - top }, style)
         }),
         Marks::HorizontalLine { y } => {
             let y = frame.y_px(*y);
@@ -256,13 +256,13 @@ pub(crate) fn swatch(series: &Series, style: Style, x: f64, y: f64) -> Group {
                 Some(_) => error_bar(group, middle, [(y - 7.0, true), (y + 7.0, true)], style),
                 None => group,
             };
-            marker(group, (middle, y), 3.8, 1.0, style)
+            marker(group, middle, y, 3.8, 1.0, style)
         }
         Marks::Band { .. } => {
             let outline = [ends(-6.0)[0], ends(-6.0)[1], ends(6.0)[1], ends(6.0)[0]];
             band(group, &outline, style).add(thin(&ends(-6.0), style)).add(thin(&ends(6.0), style))
         }
-        Marks::Bars { .. } => bar(group, (x + 5.0, y - 6.0, SWATCH_PX - 10.0, 12.0), style),
+        Marks::Bars { .. } => bar(group, Rect { x: x + 5.0, y: y - 6.0, w: SWATCH_PX - 10.0, h: 12.0 }, style),
         Marks::HorizontalLine { .. } | Marks::VerticalLine { .. } => group.add(reference(&ends(0.0), style)),
     }
 }
@@ -295,13 +295,13 @@ fn band(group: Group, outline: &[(f64, f64)], style: Style) -> Group {
     group.add(area.set("fill", style.colour).set("fill-opacity", "0.2"))
 }
 
-fn bar(group: Group, (x, y, width, height): (f64, f64, f64, f64), style: Style) -> Group {
+fn bar(group: Group, Rect { x, y, w, h }: Rect, style: Style) -> Group {
     let bar = Rectangle::new()
         .set("class", "bar")
         .set("x", number(x))
         .set("y", number(y))
-        .set("width", number(width))
-        .set("height", number(height))
+        .set("width", number(w))
+        .set("height", number(h))
         .set("fill", style.colour)
         .set("fill-opacity", "0.35")
         .set("stroke", style.colour)
@@ -320,7 +320,7 @@ fn error_bar(group: Group, x: f64, ends: [(f64, bool); 2], style: Style) -> Grou
     caps.fold(group, |group, &(y, _)| group.add(line(x - CAP_PX, y, x + CAP_PX, y, "cap")))
 }
 
-fn marker(group: Group, (x, y): (f64, f64), radius: f64, opacity: f64, style: Style) -> Group {
+fn marker(group: Group, x: f64, y: f64, radius: f64, opacity: f64, style: Style) -> Group {
     // Equal areas look equally large: forms with corners reach further than a circle.
     let r = radius;
     let corners = |corners: &[(f64, f64)]| {

@@ -56,7 +56,8 @@ struct Edge<'a> {
 impl FrameChain {
     /// The only chain between two frames; an error says why there is none, or which two there are.
     pub(crate) fn find(
-        (parent, child): (&str, &str),
+        parent: &str,
+        child: &str,
         moving: &BTreeMap<(String, String), u64>,
         mounted: &StaticFrames,
     ) -> Result<Self, String> {
@@ -74,14 +75,14 @@ impl FrameChain {
                 edges.entry(from).or_default().push(Edge { to, number, step });
             }
         }
-        let Some(chain) = shortest(&edges, (parent, child), None) else {
+        let Some(chain) = shortest(&edges, parent, child, None) else {
             return Err(format!("no transform from {parent} directly to {child}, and no chain of them leads there"));
         };
         let named = |chain: &[&Edge<'_>]| {
             let frames = std::iter::once(parent).chain(chain.iter().map(|edge| edge.to));
             frames.collect::<Vec<_>>().join(" to ")
         };
-        let other = chain.iter().find_map(|edge| shortest(&edges, (parent, child), Some(edge.number)));
+        let other = chain.iter().find_map(|edge| shortest(&edges, parent, child, Some(edge.number)));
         if let Some(other) = other {
             let why = "name two frames between which one chain leads";
             return Err(format!("two chains lead there, {} and {}; {why}", named(&chain), named(&other)));
@@ -170,7 +171,7 @@ impl FrameChain {
                         ));
                     }
                 };
-                self.corrected(moved, (own, measured), composed)
+                self.corrected(moved, own, measured, composed)
             }
             _ => Err(format!(
                 "{} of its transforms move, where a chain of one measured transform and the wheels' odometry is read: {}",
@@ -185,7 +186,8 @@ impl FrameChain {
     fn corrected(
         &self,
         moved: &Moved,
-        (own, measured): (usize, usize),
+        own: usize,
+        measured: usize,
         composed: impl Fn(&[(usize, &Rigid)]) -> Rigid,
     ) -> Result<(Vec<Placed>, Option<String>), String> {
         let [odometry, corrections] = [own, measured].map(|place| {
@@ -255,7 +257,8 @@ impl FrameChain {
 /// The chain of the fewest transforms without one of them.
 fn shortest<'e, 'a>(
     edges: &'e BTreeMap<&'a str, Vec<Edge<'a>>>,
-    (from, to): (&'a str, &'a str),
+    from: &'a str,
+    to: &'a str,
     without: Option<usize>,
 ) -> Option<Vec<&'e Edge<'a>>> {
     let mut reached: BTreeMap<&str, Option<(&str, &Edge<'_>)>> = BTreeMap::from([(from, None)]);
@@ -336,7 +339,7 @@ mod tests {
         wheels: &[Times],
     ) -> Result<(Vec<[f64; 3]>, Option<String>), String> {
         let frames: Vec<[&str; 2]> = messages.iter().map(|(_, frames, _)| *frames).collect();
-        let chain = FrameChain::find(between, &pairs(&frames), mounted)?;
+        let chain = FrameChain::find(between.0, between.1, &pairs(&frames), mounted)?;
         let mut moved = chain.moved();
         for (tenth, frames, pose) in messages {
             chain.take(&stamped(*tenth, *frames, *pose), 7, &mut moved);
@@ -374,7 +377,7 @@ mod tests {
             are_close(&found, &expected);
             assert_eq!(note, None);
         }
-        let chain = FrameChain::find(("mocap", "marker"), &pairs(&[MOCAP]), &StaticFrames::default()).expect("direct");
+        let chain = FrameChain::find("mocap", "marker", &pairs(&[MOCAP]), &StaticFrames::default()).expect("direct");
         assert_eq!(chain.describe(), "mocap to marker");
     }
 
@@ -438,7 +441,7 @@ mod tests {
     fn without_one_chain_alone_nothing_is_composed() {
         let mut mounted = StaticFrames::default();
         mounted.take(&stamped(0, ["base_link", "laser"], [0.0; 3]));
-        let find = |between, of: &[[&str; 2]]| FrameChain::find(between, &pairs(of), &mounted);
+        let find = |(parent, child), of: &[[&str; 2]]| FrameChain::find(parent, child, &pairs(of), &mounted);
         let refused = |between, of: &[[&str; 2]]| find(between, of).expect_err("refused");
         assert!(refused(("map", "base_link"), &[ODOM]).contains("no transform from map directly to base_link"));
         // What moves is not followed from the child to the parent.

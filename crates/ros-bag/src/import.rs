@@ -114,7 +114,7 @@ pub(crate) fn import_of(bag: &Bag, survey: &Survey, options: &Options) -> Result
     let clocks = clocks(&both, &mut warnings)?;
     warnings.extend(gyro_open);
     let must_have_gyro = options.gyro.is_some() || (truth.is_none() && scan.is_none());
-    let gyro = gyro_column(&both, clocks[0], (options, must_have_gyro), &mut warnings)?;
+    let gyro = gyro_column(&both, clocks[0], options, must_have_gyro, &mut warnings)?;
     let has_gyro = gyro.is_some();
     let (rates, cut_s) = (options.rates.unwrap_or(Rates::IntervalEnd), options.cut_s);
     let has_scans = options.scan.is_some();
@@ -136,8 +136,8 @@ pub(crate) fn import_of(bag: &Bag, survey: &Survey, options: &Options) -> Result
         let notes = dataset.provenance.notes.take().unwrap_or_default();
         dataset.provenance.notes = Some(format!("{notes}, walls of {} ({})", scan.name, scan.type_name));
     }
-    let whats = (wheels_what, truth_reader.as_ref().map(TruthReader::describe));
-    let took = Took::of(&both, whats, clocks, has_gyro, scans);
+    let truth_what = truth_reader.as_ref().map(TruthReader::describe);
+    let took = Took::of(&both, wheels_what, truth_what, clocks, has_gyro, scans);
     warnings.extend(wrap_warnings(&dataset).iter().map(ToString::to_string));
     Ok(FromBag { dataset, took, warnings })
 }
@@ -198,7 +198,8 @@ fn refuse_no_run(dataset: &Dataset, both: &BothRows, options: &Options) -> Resul
 fn gyro_column(
     both: &BothRows,
     clock: Clock,
-    (options, is_needed): (&Options, bool),
+    options: &Options,
+    is_needed: bool,
     warnings: &mut Vec<String>,
 ) -> Result<Option<GyroColumn>, RosBagError> {
     let Some(rows) = &both.gyro else { return Ok(None) };

@@ -256,8 +256,8 @@ impl Recorder {
 }
 
 /// The mean twist between two poses, by the midpoint rule.
-fn twist((from_s, from): (f64, Pose), (to_s, to): (f64, Pose)) -> BodyTwist {
-    let (moved, dt_s) = (from.to(to), to_s - from_s);
+fn twist(from: (f64, Pose), to: (f64, Pose)) -> BodyTwist {
+    let (moved, dt_s) = (from.1.to(to.1), to.0 - from.0);
     let turn_rad = wrap_to_pi(moved.theta_rad);
     let (sin, cos) = sin_cos(0.5 * turn_rad);
     if dt_s > 0.0 {

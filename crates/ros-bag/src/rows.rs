@@ -171,14 +171,15 @@ pub(crate) enum WheelSource {
 /// Reads wheels, poses and, where it is asked for, the gyroscope.
 pub(crate) fn read(bag: &Bag, wheels: &WheelSource, others: Others<'_>) -> Result<BothRows, RosBagError> {
     match wheels {
-        WheelSource::One(topic, reader) => read_one(bag, (topic, reader), others),
+        WheelSource::One(topic, reader) => read_one(bag, topic, reader, others),
         WheelSource::Two(pair, resampling) => read_two(bag, pair, *resampling, others),
     }
 }
 
 fn read_one(
     bag: &Bag,
-    (wheel_topic, wheel_reader): (&str, &WheelReader),
+    wheel_topic: &str,
+    wheel_reader: &WheelReader,
     others: Others<'_>,
 ) -> Result<BothRows, RosBagError> {
     let mut wheels: WheelRows = Rows::new(wheel_topic, "");

@@ -42,7 +42,8 @@ impl Took {
     /// What wheels and poses are, by which clocks, whether the gyroscope was taken, and what was of scans.
     pub(crate) fn of(
         both: &BothRows,
-        (wheels_what, truth_what): (String, Option<String>),
+        wheels_what: String,
+        truth_what: Option<String>,
         clocks: [Clock; 2],
         has_gyro: bool,
         scans: Option<(&str, TakenScans)>,

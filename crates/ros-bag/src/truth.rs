@@ -78,7 +78,7 @@ impl TruthReader {
             let slashless = |frame: &str| frame.trim_start_matches('/').to_owned();
             let (parent, child) = (slashless(parent), slashless(child));
             if !topic.frames.contains_key(&(parent.clone(), child.clone())) {
-                let chain = FrameChain::find((&parent, &child), &topic.frames, mounted);
+                let chain = FrameChain::find(&parent, &child, &topic.frames, mounted);
                 let fixed: Vec<String> = mounted.all().map(|(parent, child, _)| format!("{parent},{child}")).collect();
                 let fixed = if fixed.is_empty() { "none".to_owned() } else { fixed.join(" ") };
                 let frames = || format!("there are {}, and by /tf_static {fixed}", listed.join(" "));

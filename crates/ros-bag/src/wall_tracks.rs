@@ -43,7 +43,7 @@ pub(crate) fn follow(
     for lines in scans {
         let misfits: Vec<Vec<f64>> = lines
             .iter()
-            .map(|line| tracks.iter().map(|track| misfit(track, line, path, body_from_lidar)).collect())
+            .map(|(t_s, line)| tracks.iter().map(|track| misfit(track, *t_s, line, path, body_from_lidar)).collect())
             .collect();
         let known = tracks.len();
         for (number, (t_s, line)) in lines.iter().enumerate() {
@@ -99,8 +99,8 @@ impl Track {
 }
 
 /// How far a line is off from where a wall is expected, in tolerances.
-fn misfit(track: &Track, (t_s, line): &(f64, WallLine), path: &NominalPath, body_from_lidar: Option<Pose>) -> f64 {
-    let motion = path.at(track.t_s).zip(path.at(*t_s)).zip(path.moved(track.t_s, *t_s));
+fn misfit(track: &Track, t_s: f64, line: &WallLine, path: &NominalPath, body_from_lidar: Option<Pose>) -> f64 {
+    let motion = path.at(track.t_s).zip(path.at(t_s)).zip(path.moved(track.t_s, t_s));
     let Some(((from, to), (driven_m, turned_rad))) = motion else { return f64::INFINITY };
     let heading_rad = track.heading_rad + to.theta_rad - from.theta_rad;
     let heading_tolerance_rad = WALL_HEADING_TOLERANCE_RAD + WALL_TURN_SHARE * turned_rad;

@@ -128,7 +128,8 @@ impl Body {
         setup: &DriveSetup,
         streams: &mut DriveStreams,
         effects: &mut ActiveEffects,
-        (dt_s, motion): (f64, &ShaftMotion),
+        dt_s: f64,
+        motion: &ShaftMotion,
     ) -> Step {
         let mut step = self.step(setup, dt_s, motion);
         effects.motor(&mut step);

@@ -65,7 +65,8 @@ impl<'a> Drive<'a> {
     #[inline]
     pub(crate) fn start(
         setup: &'a DriveSetup,
-        (actuator, start): (Actuator, Start),
+        actuator: Actuator,
+        start: Start,
         streams: &'a mut DriveStreams,
         effects: &'a mut ActiveEffects,
         observers: &'a mut [Observer],
@@ -190,7 +191,7 @@ impl<'a> Drive<'a> {
     #[inline]
     fn advance(&mut self, dt_s: f64) {
         let motion = self.actuator.turn(dt_s);
-        let step = self.body.advance(self.setup, self.streams, self.effects, (dt_s, &motion));
+        let step = self.body.advance(self.setup, self.streams, self.effects, dt_s, &motion);
         self.actuator.count(&step);
     }
 
@@ -225,7 +226,7 @@ impl<'a> Drive<'a> {
         if let (Some(left), Some(right)) = (log.read.left, log.read.right) {
             let (due_s, SampleClock { stamp_s, read_s }) = (log.due_s, log.pending);
             *log = LogClock::schedule(log.interval_s, log.rows + 1, self.effects);
-            self.write_row((due_s, read_s.left.max(read_s.right), stamp_s), Wheels { left, right });
+            self.write_row(due_s, read_s.left.max(read_s.right), stamp_s, Wheels { left, right });
         }
     }
 
@@ -238,14 +239,14 @@ impl<'a> Drive<'a> {
             let mut sample = SampleClock { stamp_s: t_s, read_s: Wheels::both(t_s) };
             self.effects.clock(&mut sample);
             let counts = self.actuator.counts();
-            self.write_row((t_s, t_s, sample.stamp_s), counts);
+            self.write_row(t_s, t_s, sample.stamp_s, counts);
         }
     }
 
     /// The row that was due at an instant, read by another and stamped with a third, unless the last row is
     /// as late.
     #[inline]
-    fn write_row(&mut self, (due_s, read_s, stamp_s): (f64, f64, f64), counts: Wheels<i64>) {
+    fn write_row(&mut self, due_s: f64, read_s: f64, stamp_s: f64, counts: Wheels<i64>) {
         if due_s <= self.last_row_s + SAME_INSTANT_S {
             return;
         }

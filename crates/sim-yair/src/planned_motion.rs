@@ -41,14 +41,14 @@ impl PlannedMotion {
                 (Increment { distance_m: radius_m * turn_rad.abs(), turn_rad }, cruise_m_s)
             }
         };
-        let command = command(robot, nominal_geometry, (increment, speed_m_s));
+        let command = command(robot, nominal_geometry, increment, speed_m_s);
         Self::Go { command, segments: segments(&command).map(|segments| segments.as_slice().to_vec()) }
     }
 }
 
 /// What the wheels are told for a motion whose faster wheel has a speed, m/s: whole counts by the nominal
 /// geometry, both wheels done at the same time.
-fn command(robot: &Robot, nominal_geometry: &DriveGeometry, (increment, speed_m_s): (Increment, f64)) -> Command {
+fn command(robot: &Robot, nominal_geometry: &DriveGeometry, increment: Increment, speed_m_s: f64) -> Command {
     let travel_m = nominal_geometry.travel_m(increment);
     let counts_per_rad = robot.encoder.counts_per_wheel_turn() / std::f64::consts::TAU;
     let m_per_count = nominal_geometry.m_per_rad().map(|m_per_rad| m_per_rad / counts_per_rad);

@@ -72,7 +72,8 @@ impl PrecomputedRun {
         setup: &DriveSetup,
         start: &Start,
         streams: &mut DriveStreams,
-        (effects, observers): (&mut ActiveEffects, &mut [Observer]),
+        effects: &mut ActiveEffects,
+        observers: &mut [Observer],
         run: &mut Run,
     ) -> Body {
         let mut body = Body::new(setup, start);
@@ -89,7 +90,7 @@ impl PrecomputedRun {
             }
             for &segment in &interval.segments {
                 let motion = drive.whole(segment);
-                let step = body.advance(setup, streams, effects, (segment.duration_s, &motion));
+                let step = body.advance(setup, streams, effects, segment.duration_s, &motion);
                 drive.count(&step);
             }
             let mut readout = Readout { ticks: drive.counts(), m_per_count: setup.m_per_count, written: true };

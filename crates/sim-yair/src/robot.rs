@@ -257,8 +257,8 @@ impl SimulatedRobot {
         }
         let start = self.start(streams.stream(PLACEMENT), streams.stream(WHEEL_PHASE));
         if let Some(precomputed_run) = &plan.precomputed_run {
-            let at_work = (&mut self.effects, &mut self.observers[..]);
-            let body = precomputed_run.drive(&self.setup, &start, &mut self.streams, at_work, run);
+            let (effects, observers) = (&mut self.effects, &mut self.observers[..]);
+            let body = precomputed_run.drive(&self.setup, &start, &mut self.streams, effects, observers, run);
             self.session.t_s += body.t_s;
             self.session.distance_m += body.distance_m;
             self.last_ends = (start.world_from_body, body.world_from_body.pose());
@@ -270,14 +270,8 @@ impl SimulatedRobot {
                 Actuator::Stepping(Box::new(ServoPair::new(&self.robot, start.counts, step_s)?))
             }
         };
-        let mut drive = Drive::start(
-            &self.setup,
-            (actuator, start),
-            &mut self.streams,
-            &mut self.effects,
-            &mut self.observers,
-            run,
-        );
+        let mut drive =
+            Drive::start(&self.setup, actuator, start, &mut self.streams, &mut self.effects, &mut self.observers, run);
         drive.stand();
         for motion in &plan.motions {
             drive.perform(motion)?;

@@ -62,7 +62,7 @@ pub struct TrueRun {
 }
 
 impl TrueRun {
-    fn new(run: &str, (start, end): (Pose, Pose)) -> Self {
+    fn new(run: &str, start: Pose, end: Pose) -> Self {
         Self {
             run: run.to_owned(),
             start_x_m: start.x_m,
@@ -101,7 +101,10 @@ pub fn simulate_programs(
     for program in programs {
         let mut run = Run::default();
         robot.drive_into(program, &mut run)?;
-        true_runs.push(TrueRun::new(&program.id, robot.last_true_ends()));
+        true_runs.push({
+            let (start, end) = robot.last_true_ends();
+            TrueRun::new(&program.id, start, end)
+        });
         runs.push(run);
     }
     let geometry = robot.true_geometry();

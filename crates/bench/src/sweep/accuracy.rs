@@ -100,7 +100,7 @@ pub fn compare(result: &SweepResult, baseline: &SweepResult, location: &str) -> 
             return Err(differ(format!("it was made for other levels, methods or parameters than the point {point}")));
         }
         for (is, was) in now.estimators.iter().zip(&then.estimators) {
-            all.extend(comparisons(&point, (is, now.trials), (was, then.trials)));
+            all.extend(comparisons(&point, is, now.trials, was, then.trials));
         }
     }
     let tail = FALSE_ALARM_BUDGET / (2.0 * all.len().max(1) as f64);
@@ -118,11 +118,7 @@ pub fn compare(result: &SweepResult, baseline: &SweepResult, location: &str) -> 
 }
 
 /// Everything that can be compared of one estimator; the numbers beside the estimators are their trials.
-fn comparisons(
-    point: &str,
-    (is, is_of): (&EstimatorResult, u64),
-    (was, was_of): (&EstimatorResult, u64),
-) -> Vec<Comparison> {
+fn comparisons(point: &str, is: &EstimatorResult, is_of: u64, was: &EstimatorResult, was_of: u64) -> Vec<Comparison> {
     let (method, parameter) = (&is.method, &is.parameter);
     let number = |statistic, was: f64, is: f64, z: f64| Comparison {
         point: point.to_owned(),

@@ -85,8 +85,8 @@ fn metres(point: &PointResult, method: &str, _: &str) -> Option<(f64, f64)> {
     Some((point.costs.iter().find(|cost| cost.method == method)?.metres, 0.0))
 }
 
-fn percent((value, error): (f64, f64), truth: f64) -> (f64, f64) {
-    (100.0 * value / truth, 100.0 * error / truth)
+fn percent(with_error: (f64, f64), truth: f64) -> (f64, f64) {
+    (100.0 * with_error.0 / truth, 100.0 * with_error.1 / truth)
 }
 
 /// The picture of a sweep; `None` when there is no axis with two levels.

@@ -212,9 +212,8 @@ impl State {
         let is_part = |(point, sum): &(usize, PointSum)| {
             let from = if *point == first.point { first.chunk } else { 0 };
             let to = if *point == next.point { next.chunk } else { plan.chunks() };
-            let sizes = (plan.estimates(), plan.methods.len());
             (sum.chunks.first(), sum.chunks.next()) == (from, to)
-                && sum.is_of(sizes, plan.chunks(), |chunk| plan.trials_before(chunk))
+                && sum.is_of(plan.estimates(), plan.methods.len(), plan.chunks(), |chunk| plan.trials_before(chunk))
         };
         if !self.finished.iter().all(|(_, result)| is_result(result)) || !self.open.iter().all(is_part) {
             return Some("its sums are of no such trials");

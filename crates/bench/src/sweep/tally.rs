@@ -153,7 +153,8 @@ impl PointSum {
     /// `trials_before` tells the trials.
     pub(super) fn is_of(
         &self,
-        (estimates, methods): (usize, usize),
+        estimates: usize,
+        methods: usize,
         chunks: u64,
         trials_before: impl Fn(u64) -> u64,
     ) -> bool {

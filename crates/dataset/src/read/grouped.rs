@@ -114,7 +114,7 @@ impl Grouped {
         let from_s = ends.filter(|_| blocks.start > 0).map_or(f64::NEG_INFINITY, |ends| *ends.0);
         let to_s = ends.filter(|_| !is_last).map_or(f64::INFINITY, |ends| *ends.1);
         for (truth, rows) in &mut self.truths {
-            truth.read_between(number, rows, (from_s, to_s), &self.points, &mut run)?;
+            truth.read_between(number, rows, from_s, to_s, &self.points, &mut run)?;
         }
         let mut run = unwrapped(run, robot);
         counted::restore(slice::from_mut(&mut run), robot);

@@ -166,7 +166,8 @@ impl TruthTable {
         &mut self,
         number: usize,
         survey: &Survey,
-        (from_s, to_s): (f64, f64),
+        from_s: f64,
+        to_s: f64,
         points: &PointIndex,
         run: &mut Run,
     ) -> Result<(), DatasetError> {

@@ -18,7 +18,7 @@ pub(crate) struct Contrast {
 
 impl Contrast {
     /// Of a unit's size and that of the others, in the sense of the others.
-    pub(crate) fn of((own, others): (f64, f64), covariance: &DMatrix<f64>) -> Option<Self> {
+    pub(crate) fn of(own: f64, others: f64, covariance: &DMatrix<f64>) -> Option<Self> {
         let variance = covariance[(0, 0)] - covariance[(0, 1)] + 0.25 * covariance[(1, 1)];
         let (sigma, sigma_of_others) = (variance.sqrt(), covariance[(1, 1)].sqrt());
         (sigma > 0.0 && sigma_of_others > 0.0).then(|| Self {
@@ -51,7 +51,7 @@ mod tests {
     fn a_contrast_counts_in_the_sense_of_the_others() {
         let covariance = DMatrix::from_row_slice(2, 2, &[0.04, 0.01, 0.01, 0.04]);
         for sign in [1.0, -1.0] {
-            let of = |own: f64| Contrast::of((sign * own, sign), &covariance).expect("determined");
+            let of = |own: f64| Contrast::of(sign * own, sign, &covariance).expect("determined");
             // 0.04 − 0.01 + 0.04/4 = 0.04.
             assert!((of(1.0).value.0 - 0.5).abs() < 1e-15 && (of(1.0).value.1 - 0.2).abs() < 1e-15);
             assert!((of(-1.0).value.0 + 1.5).abs() < 1e-15);

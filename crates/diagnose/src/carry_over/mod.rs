@@ -214,7 +214,7 @@ fn sizes_by_unit(model: &AugmentedModel<'_>, candidate: usize, units: &Units, le
     };
     let contrast = |unit: usize| {
         let (shares, covariance) = system.shares(2, |run| unit_of(run).map(|of| usize::from(of != unit)))?;
-        Contrast::of((shares[0], shares[1]), &covariance)
+        Contrast::of(shares[0], shares[1], &covariance)
     };
     let of_units: Vec<UnitShare> = units
         .names

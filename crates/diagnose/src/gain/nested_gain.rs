@@ -54,7 +54,8 @@ fn of_level(
     for (number, name) in units.names.iter().enumerate() {
         let unit = HeldOutUnit { unit: name.clone(), found: None, why_null: None, final_position_m: None };
         let sessions = datasets.iter().enumerate();
-        let rest: Vec<Dataset> = sessions.filter_map(|session| Some(part(session, units, number, false)?.1)).collect();
+        let rest: Vec<Dataset> =
+            sessions.filter_map(|(session, of)| Some(part(session, of, units, number, false)?.1)).collect();
         held_out.push(match diagnose(&rest, &options) {
             Err(error @ DiagnoseError::UnknownEffect { .. }) => return Err(error),
             Err(error) => HeldOutUnit { why_null: Some(error.to_string()), ..unit },
@@ -90,7 +91,8 @@ fn final_position(before: &[EndError], after: &[EndError]) -> Option<Compared> {
 /// The runs of a session that are of a unit, or those that are not: their numbers, and a dataset of them.
 /// `None` where there is none.
 fn part(
-    (session, dataset): (usize, &Dataset),
+    session: usize,
+    dataset: &Dataset,
     units: &Units,
     unit: usize,
     is_of_unit: bool,
@@ -119,7 +121,7 @@ fn end_errors(
     let extended = if found.is_empty() { &plain } else { &model.calibration };
     let (mut before, mut after) = EndErrors::default();
     for (session, dataset) in datasets.iter().enumerate() {
-        let Some((held, records)) = part((session, dataset), units, unit, true) else { continue };
+        let Some((held, records)) = part(session, dataset, units, unit, true) else { continue };
         let (records, _) = model.undone(&records).map_err(|error| error.to_string())?;
         for (calibration, ends) in [(&plain, &mut before), (extended, &mut after)] {
             let runs = evaluate_runs(&records.session(), Some(calibration), &EvaluationOptions::default(), &mut 0.0);

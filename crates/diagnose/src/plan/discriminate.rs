@@ -61,7 +61,7 @@ pub(super) fn discriminate(
     let after = with_parts(&before, &parts, &options);
     let sigmas = discriminated
         .iter()
-        .filter_map(|pair| rivals.discrimination(&after, *pair))
+        .filter_map(|pair| rivals.discrimination(&after, pair.0, pair.1))
         .map(|discrimination| discrimination.sigmas);
     let sigmas = sigmas.fold(f64::INFINITY, f64::min);
     let (what, predicts) = predictions(base, &without, &rivals, &before, &discriminated, &parts, setting)
@@ -152,7 +152,7 @@ impl DiscriminationSearch<'_> {
             let equations = self.after(&[option], self.most_pairs(&[option], self.setting.minutes));
             let worst = pairs
                 .iter()
-                .filter_map(|pair| self.rivals.discrimination(&equations, *pair))
+                .filter_map(|pair| self.rivals.discrimination(&equations, pair.0, pair.1))
                 .map(|discrimination| discrimination.sigmas);
             Some((option.0, worst.min_by(f64::total_cmp)?))
         });
@@ -178,7 +178,7 @@ impl DiscriminationSearch<'_> {
         let equations = self.after(kinds, pairs);
         let margin = |pair: &Pair| {
             self.rivals
-                .discrimination(&equations, *pair)
+                .discrimination(&equations, pair.0, pair.1)
                 .map_or(f64::NEG_INFINITY, |discrimination| discrimination.margin(confidence))
         };
         names.iter().map(margin).fold(f64::INFINITY, f64::min)

@@ -31,8 +31,11 @@ use manoeuvres::library;
 /// not have shown; or why there is nothing to drive.
 pub(crate) fn next_experiment(
     datasets: &[Dataset],
-    (base, found): (&ModelFit<'_>, &SearchResult<'_>),
-    (model, catalogue, detectability): (&AugmentedModel<'_>, &[Candidate], &[Blind]),
+    base: &ModelFit<'_>,
+    found: &SearchResult<'_>,
+    model: &AugmentedModel<'_>,
+    catalogue: &[Candidate],
+    detectability: &[Blind],
     limits: &Limits,
 ) -> Result<NextExperiment, String> {
     let setting = Setting::of_data(datasets, model, limits).ok_or("there is no dataset")?;

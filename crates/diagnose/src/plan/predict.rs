@@ -51,7 +51,7 @@ pub(super) fn predictions(
                 let own = (0..rival_columns.columns.len())
                     .map(|k| Column::Term(without.fit.solution.model.term_values.len() + k).index());
                 let columns: Vec<usize> = rivals.frame.free.iter().copied().chain(own).collect();
-                run.of(&without.fit.solution.model, &all, &columns, (&step, &covariance))
+                run.of(&without.fit.solution.model, &all, &columns, &step, &covariance)
             })
             .collect::<Option<_>>()?;
         let components = if setting.sees_heading { 3 } else { 2 };
@@ -153,7 +153,8 @@ impl PlannedRun {
         model: &Model,
         all: &[Candidate],
         columns: &[usize],
-        (step, covariance): (&DVector<f64>, &DMatrix<f64>),
+        step: &DVector<f64>,
+        covariance: &DMatrix<f64>,
     ) -> Option<Vec<Measured>> {
         let parameters: usize = all.iter().map(|candidate| candidate.parameters().len()).sum();
         let mut named = model.clone();

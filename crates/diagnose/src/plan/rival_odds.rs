@@ -167,11 +167,7 @@ impl Rivals {
     }
 
     /// What normal equations make of a pair, whichever of the two is true.
-    pub(crate) fn discrimination(
-        &self,
-        equations: &NormalEquations,
-        (a, b): (usize, usize),
-    ) -> Option<PairDiscrimination> {
+    pub(crate) fn discrimination(&self, equations: &NormalEquations, a: usize, b: usize) -> Option<PairDiscrimination> {
         let if_first_is_true = |a: usize, b: usize| {
             let (own, size) = (&self.rival_columns[a].columns, &self.estimates[a]);
             let left = self.frame.information(equations, own, &self.frame.with(&self.rival_columns[b]))?;
@@ -256,13 +252,13 @@ pub(super) mod tests {
         let rivals = rivals(&before);
         // Both names say 10, and nothing discriminates them.
         assert!(rivals.estimates.iter().all(|size| (size[0] - 10.0).abs() < 1e-6), "{:?}", rivals.estimates);
-        let discrimination = rivals.discrimination(&before, (0, 1)).expect("determined");
+        let discrimination = rivals.discrimination(&before, 0, 1).expect("determined");
         assert!(discrimination.sigmas < 1e-3 && discrimination.margin(Confidence::P50) < 0.0, "{discrimination:?}");
         // One more measurement depends on name 1 alone. True at 10, name 1 leaves 10² · (2 − 1·1/1) to name 2
         // at its best, and name 2 leaves 10² · (1 − 1·1/2) to name 1.
         let new = normal_equations(&DMatrix::from_row_slice(1, 3, &[0.0, 1.0, 0.0]), &DVector::zeros(1));
         let after = with_runs(&before, &[(&new, 1.0)]);
-        let discrimination = rivals.discrimination(&after, (0, 1)).expect("determined");
+        let discrimination = rivals.discrimination(&after, 0, 1).expect("determined");
         // To the size of the priors. Without the other name at its best both would leave 100 or more.
         assert!((discrimination.sigmas - 50_f64.sqrt()).abs() < 1e-4, "{discrimination:?}");
         assert!((discrimination.margin(Confidence::P50) - (25.0 - 3.0)).abs() < 1e-3, "{discrimination:?}");
@@ -279,8 +275,7 @@ pub(super) mod tests {
         // of λ.
         let new = normal_equations(&DMatrix::from_row_slice(1, 3, &[0.0, 2.0, 0.0]), &DVector::zeros(1));
         let after = with_runs(&before, &[(&new, 1.0)]);
-        let margin =
-            |rivals: &Rivals| rivals.discrimination(&after, (0, 1)).expect("determined").margin(Confidence::P50);
+        let margin = |rivals: &Rivals| rivals.discrimination(&after, 0, 1).expect("determined").margin(Confidence::P50);
         let plain = rivals(&before);
         assert!((margin(&plain) - (6.4 - 3.0)).abs() < 1e-3, "{}", margin(&plain));
         // Name 2 stands out as before, by 4 standard deviations.

@@ -61,7 +61,7 @@ impl LargeLog {
         }
         taken.sort_unstable();
         taken.dedup();
-        let read = read(datasets, (&stretches, &all), &taken)?;
+        let read = read(datasets, &stretches, &all, &taken)?;
         let runs = || read.iter().flat_map(|dataset| &dataset.runs);
         let mut spans = Spans::default();
         stretches.iter().zip(&all).for_each(|(part, of)| spans.add(part.run, of.spans));
@@ -160,7 +160,8 @@ fn surveyed(stretch: &Dataset) -> Surveyed {
 /// The stretches that are taken, as runs of their datasets.
 fn read(
     datasets: &mut [Blocks],
-    (stretches, all): (&[Part], &[Surveyed]),
+    stretches: &[Part],
+    all: &[Surveyed],
     taken: &[usize],
 ) -> Result<Vec<Dataset>, DatasetError> {
     let mut read: Vec<Dataset> = datasets.iter().map(|dataset| dataset.header().clone()).collect();

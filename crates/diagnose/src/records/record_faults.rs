@@ -104,7 +104,7 @@ fn explained_by(
         if !is_plausible && !visible_in_log {
             return None;
         }
-        let same = base.and_then(|base| with_same_measurements((datasets, base), (&compared, &fit)));
+        let same = base.and_then(|base| with_same_measurements(datasets, base, &compared, &fit));
         let fits = same.as_ref().map(|same| same.each_ref().map(|of| PLAIN.fit_to_compare(&sessions(of)).ok()));
         let gain = match &fits {
             Some([before, after]) => gain(before.as_ref(), after.as_ref()?)?,

@@ -16,8 +16,10 @@ type Instant = ((usize, usize), u64);
 /// Both with the poses that both fits take, each the fit of its records; `None` where each takes as many as
 /// the other.
 pub(crate) fn with_same_measurements(
-    (datasets, base): (&[Dataset], &ModelFit<'_>),
-    (records, fit): (&[Dataset], &ModelFit<'_>),
+    datasets: &[Dataset],
+    base: &ModelFit<'_>,
+    records: &[Dataset],
+    fit: &ModelFit<'_>,
 ) -> Option<[Vec<Dataset>; 2]> {
     if base.records.measurements() == fit.records.measurements() {
         return None;
@@ -76,12 +78,12 @@ mod tests {
         fewer[0].runs[2].truth.remove(1);
         // What a fit does not take stays away from both; of the other records the same rows.
         let (of_whole, of_fewer) = (fitted(&whole), fitted(&fewer));
-        let [first, second] = with_same_measurements((&whole, &of_fewer), (&whole, &of_whole)).expect("they differ");
+        let [first, second] = with_same_measurements(&whole, &of_fewer, &whole, &of_whole).expect("they differ");
         let mut expected = all.clone();
         expected[2] -= 1;
         assert_eq!((lengths(&first), lengths(&second)), (expected.clone(), expected));
         assert_eq!(first[0].runs[2].truth, fewer[0].runs[2].truth);
-        assert!(with_same_measurements((&whole, &of_whole), (&whole, &of_whole)).is_none());
+        assert!(with_same_measurements(&whole, &of_whole, &whole, &of_whole).is_none());
     }
 
     #[test]

@@ -235,9 +235,9 @@ fn scripts_get_what_was_found_and_why_others_were_refused() {
     assert_eq!((cause(Status::Found), cause(Status::NotDiscriminated)), (None, None));
     assert_eq!(cause(Status::NotSignificant).as_deref(), Some("not significant"));
     let of = Heterogeneity::of(&[(0.2, 0.1), (1.0, 0.1), (1.8, 0.1)]).expect("three");
-    let said = differences((Level::Kind, of));
+    let said = differences(Level::Kind, of);
     assert_eq!((said.level, said.units, said.cochran_q, said.tau), (GainLevel::Kinds, 3, of.q, of.tau));
-    assert_eq!(differences((Level::Session, of)).level, GainLevel::Sessions);
+    assert_eq!(differences(Level::Session, of).level, GainLevel::Sessions);
 }
 
 #[test]

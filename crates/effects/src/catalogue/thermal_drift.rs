@@ -66,7 +66,7 @@ impl PhysicalEffect for ThermalDrift {
             summary: Summary::WithSize(|values| {
                 Statement::of(
                     MEANING,
-                    values.with_direction("growth", (100.0, "%"), "larger at the end", "smaller at the end"),
+                    values.with_direction("growth", 100.0, "%", "larger at the end", "smaller at the end"),
                 )
             }),
             excitation: Excitation::Conditions("drive the same runs cold and an hour later"),

@@ -48,8 +48,8 @@ impl PhysicalEffect for TruthLeverArm {
     fn description() -> Description {
         Description {
             summary: Summary::WithSize(|values| {
-                let ahead = values.with_direction("lever_x_m", (1e3, "mm"), "ahead", "behind");
-                let aside = values.with_direction("lever_y_m", (1e3, "mm"), "to the left", "to the right");
+                let ahead = values.with_direction("lever_x_m", 1e3, "mm", "ahead", "behind");
+                let aside = values.with_direction("lever_y_m", 1e3, "mm", "to the left", "to the right");
                 Statement::of(MEANING, format!("{ahead} and {aside}"))
             }),
             extrinsic: Some(Extrinsic::Position),

@@ -55,7 +55,7 @@ impl PhysicalEffect for TruthMapScale {
     fn description() -> Description {
         Description {
             summary: Summary::WithSize(|values| {
-                Statement::of(MEANING, values.with_direction("scale_error", (100.0, "%"), "too large", "too small"))
+                Statement::of(MEANING, values.with_direction("scale_error", 100.0, "%", "too large", "too small"))
             }),
             excitation: Excitation::Conditions("measure a straight by tape, in a run without poses (distance.csv)"),
             benchmark: Benchmark { needs: Needs { others: true, ..Needs::NONE }, ..Benchmark::OF_MEAN },

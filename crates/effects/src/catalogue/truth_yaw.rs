@@ -44,8 +44,8 @@ impl PhysicalEffect for TruthYaw {
     fn description() -> Description {
         Description {
             summary: Summary::WithSize(|values| {
-                let degrees = (180.0 / std::f64::consts::PI, "°");
-                let turned = values.with_direction("yaw_rad", degrees, "to the left", "to the right");
+                let degrees = 180.0 / std::f64::consts::PI;
+                let turned = values.with_direction("yaw_rad", degrees, "°", "to the left", "to the right");
                 Statement::of(MEANING, format!("{turned} (or toe of both wheels)"))
             }),
             extrinsic: Some(Extrinsic::Heading),

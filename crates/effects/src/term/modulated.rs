@@ -66,8 +66,8 @@ impl ModelTerm for Modulated {
         self.own.fill(Pose::IDENTITY);
         self.term.measurement(measurement, &mut self.own);
         if self.by.is_of_a_measurement() {
-            let speeds = (measurement.twist.v_m_s, measurement.twist.omega_rad_s);
-            gradient[0] = self.times(self.by.value(&seen(speeds, measurement.world_from_body, measurement.t_s)));
+            gradient[0] =
+                self.times(self.by.value(&seen(measurement.twist, measurement.world_from_body, measurement.t_s)));
         }
     }
 }

@@ -100,7 +100,7 @@ impl ModelTerm for ProductBatch {
                 interval.change(Wheels::from_sides(|side| if channel.is_of(side) { gained[side] } else { 0.0 }))
             } else {
                 // Covariates of a motion are the same whichever wheel is asked.
-                on_channel(*channel, gained.left, (at.v_m_s, at.omega_rad_s))
+                on_channel(*channel, gained.left, at.twist())
             };
         }
     }

@@ -83,16 +83,15 @@ impl ModelTerm for Recorded {
             gradient[0] = if self.of.channel.is_of_wheels() {
                 interval.change(self.of.of_wheels(self.of.channel, &at).map(|product| product * interval.dt_s))
             } else {
-                on_channel(self.of.channel, self.of.product(&at) * interval.dt_s, (at.v_m_s, at.omega_rad_s))
+                on_channel(self.of.channel, self.of.product(&at) * interval.dt_s, at.twist())
             };
         }
     }
 
     fn measurement(&mut self, measurement: &Measurement<'_>, gradient: &mut [Pose]) {
         if self.of.channel.is_of_instrument() {
-            let speeds = (measurement.twist.v_m_s, measurement.twist.omega_rad_s);
-            let product = self.of.product(&seen(speeds, measurement.world_from_body, measurement.t_s));
-            gradient[0] = on_channel(self.of.channel, product, speeds);
+            let product = self.of.product(&seen(measurement.twist, measurement.world_from_body, measurement.t_s));
+            gradient[0] = on_channel(self.of.channel, product, measurement.twist);
         }
     }
 }

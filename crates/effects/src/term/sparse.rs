@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use kinematics::{Pose, Wheels};
+use kinematics::{Pose, Twist, Wheels};
 use model_term::TermParameter;
 
 use crate::channel::Channel;
@@ -59,11 +59,11 @@ impl Sparse {
 }
 
 /// A moment at which an instrument measures: twist, heading and time alone are known of it.
-pub(super) fn seen((v_m_s, omega_rad_s): (f64, f64), world_from_body: Pose, run_s: f64) -> KinematicSample<'static> {
+pub(super) fn seen(twist: Twist, world_from_body: Pose, run_s: f64) -> KinematicSample<'static> {
     static NONE: BTreeMap<String, f64> = BTreeMap::new();
     KinematicSample {
-        v_m_s,
-        omega_rad_s,
+        v_m_s: twist.v_m_s,
+        omega_rad_s: twist.omega_rad_s,
         acceleration_m_s2: 0.0,
         yaw_acceleration_rad_s2: 0.0,
         heading_rad: world_from_body.theta_rad,
@@ -87,12 +87,12 @@ pub(super) fn seen((v_m_s, omega_rad_s): (f64, f64), world_from_body: Pose, run_
 }
 
 /// A size on a channel that is none of the wheels', by v and ω.
-pub(super) fn on_channel(channel: Channel, size: f64, (v_m_s, omega_rad_s): (f64, f64)) -> Pose {
+pub(super) fn on_channel(channel: Channel, size: f64, twist: Twist) -> Pose {
     match channel {
         Channel::Along | Channel::OffsetAlong => Pose::new(size, 0.0, 0.0),
         Channel::Across | Channel::OffsetAcross => Pose::new(0.0, size, 0.0),
         Channel::Yaw | Channel::OffsetHeading => Pose::new(0.0, 0.0, size),
-        Channel::MeasurementDelay => Pose::new(-size * v_m_s, 0.0, -size * omega_rad_s),
+        Channel::MeasurementDelay => Pose::new(-size * twist.v_m_s, 0.0, -size * twist.omega_rad_s),
         // What both wheels or one of them gain needs their separation: `Sparse::of_wheels`.
         Channel::Wheels | Channel::LeftWheel | Channel::RightWheel => Pose::IDENTITY,
     }

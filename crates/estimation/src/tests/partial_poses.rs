@@ -9,7 +9,7 @@ use super::partial::{
     noise, nominal, tape,
 };
 use crate::layout::Layout;
-use crate::partial_filter::filter_taken;
+use crate::partial_filter::{PartialPass, filter_taken};
 use crate::partial_poses::{TakenPoses, Taking};
 use crate::pass::{Pass, pass};
 use crate::pass_options::{OutlierGate, PassOptions};
@@ -146,10 +146,10 @@ fn poses_are_what_they_are_in_their_own_filter() {
     let products = Products::of(Layout::whole(0), &[], None);
     let own = passed(&poses_alone(dataset.clone()), &model, &noise);
     let mut score = crate::noise_score::NoiseScore::zero();
+    let pass = PartialPass { poses: &poses, gate: OutlierGate::Off, model: &model, noise: &noise, products: &products };
     for ((partial, propagations), own) in records.partial.iter().zip(&selections[0].partial).zip(&own.runs) {
         let taken: Vec<bool> = partial.observations.iter().map(|of| poses.takes(of, Taking::PosesAlone)).collect();
-        let propagations = (&propagations.as_ref().expect("taken")[..], &taken[..], OutlierGate::Off);
-        let of = filter_taken(partial, propagations, &poses, (&model, &noise), &products, &mut []);
+        let of = filter_taken(partial, propagations.as_ref().expect("taken"), &taken, &pass, &mut []);
         let found = of.equations;
         score.add(&of.score, 1.0);
         // The start is taken as a measurement here.

@@ -2,7 +2,8 @@
 
 use super::*;
 
-const DRIVE: (f64, Wheels<f64>) = (0.4, Wheels { left: 0.1, right: 0.1 });
+const SEPARATION_M: f64 = 0.4;
+const M_PER_RAD: Wheels<f64> = Wheels { left: 0.1, right: 0.1 };
 
 /// Rows of 10 ms at a speed that rises and falls, counted by so many radians.
 fn rows(quantum_rad: f64, count: usize) -> (Vec<f64>, Wheels<Vec<f64>>) {
@@ -18,16 +19,16 @@ fn rows(quantum_rad: f64, count: usize) -> (Vec<f64>, Wheels<Vec<f64>>) {
 
 fn rates(quantum_rad: f64) -> WheelRates {
     let (t_s, turns) = rows(quantum_rad, 800);
-    WheelRates::of((&t_s, &vec![0.0; t_s.len()]), &turns, Wheels::both(quantum_rad), DRIVE, true)
+    WheelRates::of(&t_s, &vec![0.0; t_s.len()], &turns, Wheels::both(quantum_rad), SEPARATION_M, M_PER_RAD, true)
 }
 
 #[test]
 fn a_rate_does_not_have_its_own_rows_rounding() {
     let (t_s, turns) = rows(0.02, 800);
-    let before = WheelRates::of((&t_s, &vec![0.0; t_s.len()]), &turns, Wheels::both(0.02), DRIVE, true);
+    let before = WheelRates::of(&t_s, &vec![0.0; t_s.len()], &turns, Wheels::both(0.02), SEPARATION_M, M_PER_RAD, true);
     let mut moved = turns.clone();
     moved.left[400] += 0.02;
-    let after = WheelRates::of((&t_s, &vec![0.0; t_s.len()]), &moved, Wheels::both(0.02), DRIVE, true);
+    let after = WheelRates::of(&t_s, &vec![0.0; t_s.len()], &moved, Wheels::both(0.02), SEPARATION_M, M_PER_RAD, true);
     // Rejects causal and one-sided differences.
     assert!((before.at_row(400).left - after.at_row(400).left).abs() < 1e-9);
     // Its neighbours have it alike, with opposite signs.
@@ -58,7 +59,7 @@ fn a_robot_stands_where_no_count_is_near() {
     // A count of 1 mm at row 50: at 0.2 m/s² it takes 0.1 s.
     let t_s: Vec<f64> = (0..100).map(|row| 0.01 * f64::from(row)).collect();
     let turns = Wheels { left: (0..100).map(|row| if row < 50 { 0.0 } else { 0.01 }).collect(), right: vec![0.0; 100] };
-    let found = WheelRates::of((&t_s, &vec![0.0; t_s.len()]), &turns, Wheels::both(0.01), DRIVE, true);
+    let found = WheelRates::of(&t_s, &vec![0.0; t_s.len()], &turns, Wheels::both(0.01), SEPARATION_M, M_PER_RAD, true);
     let stands = |row: usize| found.stands(&t_s, [t_s[row], t_s[row + 1]], row);
     let standing: Vec<usize> = (0..99).filter(|row| stands(*row)).collect();
     // Row 49's interval has the count. Rejects a standstill up to the count itself.
@@ -69,17 +70,17 @@ fn a_robot_stands_where_no_count_is_near() {
 fn gaps_and_ends_are_no_part_of_a_window() {
     let (mut t_s, turns) = rows(0.0, 100);
     t_s[50..].iter_mut().for_each(|t_s| *t_s += 0.5);
-    let found = WheelRates::of((&t_s, &vec![0.0; t_s.len()]), &turns, Wheels::both(0.0), DRIVE, true);
+    let found = WheelRates::of(&t_s, &vec![0.0; t_s.len()], &turns, Wheels::both(0.0), SEPARATION_M, M_PER_RAD, true);
     let joined = |row: usize| found.are_joined(&t_s, row);
     assert!(joined(48) && !joined(49) && joined(50));
     let own = |row: usize| (turns.left[row + 1] - turns.left[row]) / 0.01;
     assert!((found.at_row(49).left - own(48)).abs() < 1e-9 && (found.at_row(50).left - own(50)).abs() < 1e-9);
     assert!((found.at_row(0).left - own(0)).abs() < 1e-9 && (found.at_row(99).left - own(98)).abs() < 1e-9);
     // In a log with gaps every row is alone.
-    let gaps = WheelRates::of((&t_s, &vec![0.0; t_s.len()]), &turns, Wheels::both(0.0), DRIVE, false);
+    let gaps = WheelRates::of(&t_s, &vec![0.0; t_s.len()], &turns, Wheels::both(0.0), SEPARATION_M, M_PER_RAD, false);
     assert!((0..99).all(|row| !gaps.are_joined(&t_s, row)));
     let slow_s: Vec<f64> = (0..100).map(f64::from).collect();
-    let slow = WheelRates::of((&slow_s, &[0.0; 100]), &turns, Wheels::both(0.0), DRIVE, true);
+    let slow = WheelRates::of(&slow_s, &[0.0; 100], &turns, Wheels::both(0.0), SEPARATION_M, M_PER_RAD, true);
     assert!((0..99).all(|row| !slow.are_joined(&slow_s, row)));
 }
 
@@ -94,7 +95,7 @@ fn rows_of_one_number_on_the_beat_have_rates() {
         .collect();
     let turns = Wheels::both((0..400).map(|row| 0.03 * f64::from(row)).collect::<Vec<f64>>());
     let late_s: Vec<f64> = (0..400).map(|row| if row % 50 < 4 { 0.01 * f64::from(row % 50) } else { 0.0 }).collect();
-    let found = WheelRates::of((&t_s, &late_s), &turns, Wheels::both(0.0), DRIVE, true);
+    let found = WheelRates::of(&t_s, &late_s, &turns, Wheels::both(0.0), SEPARATION_M, M_PER_RAD, true);
     let rates = &found.at_rows_rad_s.left;
     // Rejects a quotient of nothing by nothing.
     assert!(rates.iter().all(|rate| rate.is_finite()), "{rates:?}");
@@ -110,7 +111,7 @@ fn regress_rows_that_are_stamped_together_are_no_fast_wheels() {
     let packets = |row: u32| 0.01 * f64::from(row / 5 * 5 + 4) + 1e-4 * f64::from(row % 5);
     for (name, stamp) in [("pause", &pause as &dyn Fn(u32) -> f64), ("packets", &packets)] {
         let t_s: Vec<f64> = (0..400).map(stamp).collect();
-        let found = WheelRates::of((&t_s, &[0.0; 400]), &turns, Wheels::both(0.0), DRIVE, true);
+        let found = WheelRates::of(&t_s, &[0.0; 400], &turns, Wheels::both(0.0), SEPARATION_M, M_PER_RAD, true);
         assert!(!found.window.row_by_row, "{name}");
         let (least, most) = found
             .at_rows_rad_s

@@ -44,7 +44,7 @@ fn counts(steps: usize) -> Wheels<Vec<i64>> {
 /// Times contenders in turn and prints each beside the first and beside the last. The ratios of a log that
 /// fills the caches, a step of which costs what it does in every longer log, are the gate's.
 #[allow(clippy::print_stdout)]
-fn race(rule: &str, (steps, rounds): (usize, usize), contenders: &mut [Contender<'_>], gate: &mut Gate) {
+fn race(rule: &str, steps: usize, rounds: usize, contenders: &mut [Contender<'_>], gate: &mut Gate) {
     let race = Race::run(rounds, contenders);
     let copy = contenders.len() - 1;
     println!("\nWhole log, {rule}, {steps} steps");
@@ -106,7 +106,7 @@ fn whole_log(steps: usize, rounds: usize, gate: &mut Gate) {
             copied.copy_from_slice(black_box(&source));
             black_box(&mut copied);
         }));
-        race(name, (steps, rounds), &mut contenders, gate);
+        race(name, steps, rounds, &mut contenders, gate);
     }
 }
 

@@ -9,7 +9,7 @@ fn sinc(x: f64) -> f64 {
 }
 
 #[inline(always)]
-fn step(odometry: &Odometry, pose: &mut Pose, (before, now): (Wheels<i64>, Wheels<i64>)) {
+fn step(odometry: &Odometry, pose: &mut Pose, before: Wheels<i64>, now: Wheels<i64>) {
     let left_m = odometry.m_per_count.left * (now.left - before.left) as f64;
     let right_m = odometry.m_per_count.right * (now.right - before.right) as f64;
     let half_rad = 0.5 * (right_m - left_m) / odometry.wheel_separation_m;
@@ -30,7 +30,7 @@ pub(crate) fn trajectory(odometry: &Odometry, start: Pose, counts: Wheels<&[i64]
     let mut before = Wheels { left: counts.left[0], right: counts.right[0] };
     for ((&left, &right), out) in counts.left.iter().zip(counts.right).zip(poses) {
         let now = Wheels { left, right };
-        step(odometry, &mut pose, (before, now));
+        step(odometry, &mut pose, before, now);
         *out = pose;
         before = now;
     }

@@ -57,7 +57,8 @@ impl Marks {
         &self,
         elementary: &impl Elementary,
         geometry: &DriveGeometry,
-        (wheel_rad, m_per_rad): (Wheels<f64>, Wheels<f64>),
+        wheel_rad: Wheels<f64>,
+        m_per_rad: Wheels<f64>,
     ) -> Spin {
         let travel_m = Wheels { left: wheel_rad.left * m_per_rad.left, right: wheel_rad.right * m_per_rad.right };
         let turn_rad = self.turn_rad(elementary, geometry.increment(travel_m).turn_rad);

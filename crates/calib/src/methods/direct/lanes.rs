@@ -118,7 +118,7 @@ impl<const W: usize> Formula<5> for SpinLanes<'_, W> {
         let m_per_rad = Wheels { left: self.m_per_rad.left[lane], right: self.m_per_rad.right[lane] };
         let marks = self.run.marks(lane);
         let Spin { turn_rad, wheel_separation_m, slope } =
-            marks.spin(elementary, self.geometry, (self.run.wheel_rad(lane), m_per_rad));
+            marks.spin(elementary, self.geometry, self.run.wheel_rad(lane), m_per_rad);
         let stated_sigma_m = marks.stated_sigma_m(wheel_separation_m / turn_rad, self.mark_sigma_m);
         [wheel_separation_m, slope.left, slope.right, stated_sigma_m, turn_rad]
     }

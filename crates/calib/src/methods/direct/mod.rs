@@ -145,7 +145,7 @@ impl Direct {
             for measured in reader.runs(Protocol::Spin) {
                 let (run, wheel_rad, marks) = measured?;
                 let Spin { turn_rad, wheel_separation_m: value, slope } =
-                    marks.spin(&Branching, &reader.geometry, (wheel_rad, m_per_rad));
+                    marks.spin(&Branching, &reader.geometry, wheel_rad, m_per_rad);
                 if turn_rad.abs() > MIN_SPIN_RAD {
                     let stated_sigma = marks.stated_sigma_m(value / turn_rad, mark_sigma_m);
                     values.push((RunValue { run, value, stated_sigma }, slope));

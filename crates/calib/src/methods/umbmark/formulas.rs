@@ -34,7 +34,8 @@ pub(super) fn calibration(
     robot: &NominalRobot,
     geometry: &DriveGeometry,
     side_m: f64,
-    (cw, ccw): (Direction, Direction),
+    cw: Direction,
+    ccw: Direction,
 ) -> Result<Calibration, CalibError> {
     let corner = corner_errors(form, side_m, cw, ccw);
     let base_m = geometry.wheel_separation_m();

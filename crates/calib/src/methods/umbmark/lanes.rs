@@ -16,7 +16,7 @@ pub(super) fn calibrations(form: Form, replicates: &Replicates) -> [Option<Resul
         let ([cw, ccw], input) = lanes.as_ref()?;
         let is_regular = cw.is_finite(lane) && ccw.is_finite(lane);
         let InputLanes { geometry, side_m, .. } = input;
-        is_regular.then(|| calibration(form, &replicates.robot, geometry, *side_m, (cw.of(lane), ccw.of(lane))))
+        is_regular.then(|| calibration(form, &replicates.robot, geometry, *side_m, cw.of(lane), ccw.of(lane)))
     })
 }
 

@@ -107,7 +107,7 @@ impl Method for Umbmark {
                 "it needs squares in both directions (protocol = \"square_cw\" and \"square_ccw\") with the pose measured at both ends",
             ));
         };
-        calibration(self.form, &robot, &geometry, side_m, (cw, ccw))
+        calibration(self.form, &robot, &geometry, side_m, cw, ccw)
     }
 
     fn calibrate_lanes(&self, replicates: &Replicates) -> [Option<Result<Calibration, CalibError>>; LANES] {

@@ -174,7 +174,7 @@ impl<'p> PartRows<'p> {
         let time = &self.part.log.time;
         match (self.part.log.run.is_empty(), times) {
             (true, Some((from, to))) => {
-                let mut rows = between(&self.by_time, time, (from, to)).to_vec();
+                let mut rows = between(&self.by_time, time, from, to).to_vec();
                 rows.sort_unstable();
                 rows
             }
@@ -185,7 +185,7 @@ impl<'p> PartRows<'p> {
 }
 
 /// Those rows of a list in the order of their times that are between two times.
-fn between<'r>(by_time: &'r [usize], time: &[i128], (from, to): (i128, i128)) -> &'r [usize] {
+fn between<'r>(by_time: &'r [usize], time: &[i128], from: i128, to: i128) -> &'r [usize] {
     let rows = &by_time[by_time.partition_point(|&row| time[row] < from)..];
     &rows[..rows.partition_point(|&row| time[row] <= to)]
 }
@@ -326,7 +326,7 @@ fn cut(parts: &[Part], run: RawRun, cut_s: f64, wheel_unit: Option<Unit>) -> Vec
             let beside = beside.iter().copied().take_while(|&row| row <= last);
             beside.filter(|&row| (from..=to).contains(&time[row])).collect()
         } else {
-            between(&by_time, time, (from, to)).to_vec()
+            between(&by_time, time, from, to).to_vec()
         };
         truth_rows.sort_unstable();
         let gyro = run.gyro.as_ref().map(|(part, rows)| {
