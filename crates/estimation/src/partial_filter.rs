@@ -21,10 +21,10 @@ use crate::noise_score::NoiseScore;
 use crate::normal_equations::NormalEquations;
 use crate::partial_noise::{NoiseDerivatives, OF_MOTION};
 use crate::partial_observation::{Observation, Place, Quantity};
-use crate::partial_poses::{PoseUpdate, StatePose, TakenPoses, Taking, instrument_by_terms};
+use crate::partial_poses::{PartialPass, PoseUpdate, StatePose, Taking, instrument_by_terms};
 use crate::partial_records::PartialSegment;
 use crate::pass_options::OutlierGate;
-use crate::products::{Products, Sums};
+use crate::products::Sums;
 use crate::propagation::{Moved, Propagator};
 use crate::quantum::variance_of_rounding;
 use crate::rounding::PoseVariance;
@@ -78,16 +78,6 @@ pub(crate) struct Filtered {
     pub(crate) equations: NormalEquations,
     pub(crate) score: NoiseScore,
     pub(crate) outliers: Vec<usize>,
-}
-
-/// What the filters of all segments share.
-#[derive(Clone, Copy)]
-pub(crate) struct PartialPass<'p> {
-    pub(crate) poses: &'p TakenPoses<'p>,
-    pub(crate) gate: OutlierGate,
-    pub(crate) model: &'p Model,
-    pub(crate) noise: &'p Noise,
-    pub(crate) products: &'p Products,
 }
 
 /// What the partial measurements of a segment say, given its poses; `propagations` lead to each place after

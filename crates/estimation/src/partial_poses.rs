@@ -9,6 +9,8 @@ use crate::noise::{Noise, NoiseComponent};
 use crate::noise_shape::{CorrelatedErrors, NoiseShape};
 use crate::partial_observation::{Observation, Quantity};
 use crate::partial_records::PartialSegment;
+use crate::pass_options::OutlierGate;
+use crate::products::Products;
 use crate::propagation::{Propagator, turned_by};
 use crate::segment::{MeasuredPose, Segment};
 use crate::thinning::PropagationInterval;
@@ -44,6 +46,16 @@ impl<'p> TakenPoses<'p> {
         self.taken.binary_search(&(segment, measurement)).ok()?;
         self.segments.get(segment)?.measurements.get(measurement)
     }
+}
+
+/// What the filters of all segments share in a pass.
+#[derive(Clone, Copy)]
+pub(crate) struct PartialPass<'p> {
+    pub(crate) poses: &'p TakenPoses<'p>,
+    pub(crate) gate: OutlierGate,
+    pub(crate) model: &'p Model,
+    pub(crate) noise: &'p Noise,
+    pub(crate) products: &'p Products,
 }
 
 /// Which measurements of a segment a filter takes.

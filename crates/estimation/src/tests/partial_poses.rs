@@ -9,8 +9,8 @@ use super::partial::{
     noise, nominal, tape,
 };
 use crate::layout::Layout;
-use crate::partial_filter::{PartialPass, filter_taken};
-use crate::partial_poses::{TakenPoses, Taking};
+use crate::partial_filter::filter_taken;
+use crate::partial_poses::{PartialPass, TakenPoses, Taking};
 use crate::pass::{Pass, pass};
 use crate::pass_options::{OutlierGate, PassOptions};
 use crate::products::Products;
