@@ -93,8 +93,8 @@ pub(crate) struct PosesOfRun<'p, 'a> {
     pub(crate) first: usize,
 }
 
-/// The partial measurements of a run, with its `poses`. A run with displacements gives none: these hold the wheels' errors as well, and a
-/// likelihood that counts them twice would be too sure.
+/// The partial measurements of a run, with its `poses`. A run with displacements gives none: these hold the
+/// wheels' errors as well, and a likelihood that counts them twice would be too sure.
 pub(crate) fn partial_segments<'a>(
     run: &RunView<'a>,
     base: &Segment<'a>,

@@ -224,13 +224,8 @@ impl<'f, 'a> Propagator<'f, 'a> {
     fn add_to_sampler(&mut self, propagation: &PropagationInterval) {
         if let Some(sampler) = &mut self.sampler {
             let intervals = &self.segment.intervals[propagation.intervals.clone()];
-            sampler.add(
-                self.segment.info.start_s.unwrap_or(0.0),
-                intervals,
-                self.model,
-                self.wheel_rad,
-                self.session_m,
-            );
+            let start_s = self.segment.info.start_s.unwrap_or(0.0);
+            sampler.add(start_s, intervals, self.model, self.wheel_rad, self.session_m);
         }
     }
 
