@@ -205,7 +205,7 @@ pub(crate) fn of_failed_checks(
     let least = |tests: &mut dyn Iterator<Item = &TestResult>| tests.map(|test| test.p_value).reduce(f64::min);
     let worst = least(&mut checked.checks.iter().filter(|test| test.shows_dependence()))
         .or_else(|| least(&mut checked.checks.iter().filter(|test| !test.passes)));
-    let worst = worst.filter(|_| !failed.is_empty())?;
+    let worst = worst.filter(|worst| *worst < FINDINGS.failed_checks_level && !failed.is_empty())?;
     // Residuals that are correlated with the ones before them may be errors of the instrument that last.
     // Tests of dependence take errors to be independent, and fail too then, if less plainly.
     let of_correlation = least(&mut checked.checks.iter().filter(|test| test.check.is_of_whiteness())).unwrap_or(1.0);
