@@ -41,6 +41,7 @@ mod moved_instrument;
 mod pages;
 mod partial;
 mod pose_errors;
+mod record_faults;
 mod robot_files;
 mod slam;
 mod spoiled_files;

@@ -16,7 +16,7 @@ pub(crate) struct Clock {
 }
 
 impl Clock {
-    fn log_s(self, stamp_s: f64) -> f64 {
+    pub(crate) fn log_s(self, stamp_s: f64) -> f64 {
         (stamp_s - self.offset_s) / (1.0 + self.rate)
     }
 }

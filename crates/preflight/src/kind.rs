@@ -2,6 +2,8 @@
 
 use kinematics::Side;
 
+use crate::record_fault::RecordFault;
+
 /// What is wrong, with its numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Kind {
@@ -27,6 +29,8 @@ pub(crate) enum Kind {
     WheelsExchanged { label: Option<bool> },
     /// A wheel counts backwards.
     WheelBackwards { sides: Vec<Side> },
+    /// Records say something else than what happened, in rows or throughout.
+    Record(RecordFault),
     /// Wheels and separation are so many times as large as stated.
     LengthUnit { ratio: f64, unit: Option<&'static str>, of_truth: bool },
     /// Both wheels are so many times as large as stated.

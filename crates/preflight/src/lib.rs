@@ -9,14 +9,17 @@
 
 mod alignment;
 mod driven;
+mod gain_change;
 mod geometry_estimate;
 mod kind;
 mod problem;
 mod problems;
+mod record_fault;
 mod regression;
 mod run_log;
 mod session_check;
 pub mod settings;
+mod shown_numbers;
 mod stages;
 mod start_values;
 mod text;

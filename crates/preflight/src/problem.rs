@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use crate::kind::Kind;
+use crate::record_fault::RecordFault;
 use crate::settings::CHECKS;
 use crate::text;
 
@@ -39,6 +40,11 @@ impl Problem {
     pub(crate) fn new(kind: &Kind, severity: Severity, runs: Option<Vec<String>>, probability: f64) -> Self {
         let sentence = text::sentence(kind, runs.as_deref());
         Self { id: text::id(kind), severity, runs, sentence, probability, fix: text::fix(kind) }
+    }
+
+    /// A fault of the records.
+    pub(crate) fn record(fault: RecordFault, severity: Severity, runs: Option<Vec<String>>, probability: f64) -> Self {
+        Self::new(&Kind::Record(fault), severity, runs, probability)
     }
 }
 

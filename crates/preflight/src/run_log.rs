@@ -131,6 +131,17 @@ impl RunLog {
         Some(Self { wheels: by_instant_rates_rad(&self.t_s, run, robot)?, ..self.clone() })
     }
 
+    /// What lies between two instants alone.
+    pub(crate) fn keep(&mut self, from_s: f64, to_s: f64) {
+        let rows = self.t_s.partition_point(|t_s| *t_s < from_s)..self.t_s.partition_point(|t_s| *t_s <= to_s);
+        self.t_s = self.t_s[rows.clone()].to_vec();
+        self.wheels = self.wheels.as_ref().map(|angles| angles[rows.clone()].to_vec());
+        let lies = |t_s: f64| (from_s..=to_s).contains(&t_s);
+        self.truth.retain(|sample| lies(sample.t_s));
+        self.displacements.retain(|of| lies(of.t0_s) && lies(of.t1_s));
+        self.partial.retain(|of| lies(of.from_s) && lies(of.to_s));
+    }
+
     /// All times by a factor.
     pub(crate) fn scale_time(&mut self, factor: f64) {
         self.t_s.iter_mut().for_each(|t_s| *t_s *= factor);

@@ -30,6 +30,52 @@ rules::settings! {
     /// Groups of consecutive windows that the jackknife leaves out in turn.
     /// Convention: eight; standard deviations are then known to a quarter.
     groups: usize = 8,
+    /// Windows at the least in which a wheel's records say something else than in the others.
+    /// Budgeted: four seconds of driving, over which the error of one window does not pass for a gain.
+    min_faulty_windows: usize = 8,
+    /// Parts of a session's windows between which a span of them is looked for first.
+    /// Budgeted: the 2000 spans between them are compared in a few milliseconds.
+    span_grid: usize = 64,
+    /// Share of a session's windows for which all of them count beside those outside of a span.
+    /// Tuned: on 230 sound logs of all kinds and 300 mixed ones; a regression on straights alone then says
+    /// nothing of turns, and a gain comes out wrong by less than a hundredth.
+    whole_log_share: f64 = 0.01,
+    /// Ratio to the usual motion of a window, below which it is at rest.
+    /// Budgeted: a robot that goes so slowly says a twentieth of what it says at speed.
+    max_still_ratio: f64 = 0.05,
+    /// Ratio of a wheel's gains in two parts of a log from which on its records say something else.
+    /// Tuned: on 230 sound logs of all kinds and 300 mixed ones, none of which has such a part; gains of 0.8
+    /// and 1.2 are found in 46 of 48 logs. Loads and tyres change a wheel by less than 3 %.
+    min_gain_change: f64 = 1.1,
+    /// Quantile of the residuals in such a part that its gains must explain.
+    /// Budgeted: one window in four may be an outlier; of a square that is driven the other way round, one in
+    /// three is a turn.
+    explained_quantile: f64 = 0.75,
+    /// Gain below which a wheel is dead.
+    /// Tuned: on 96 logs with a dead wheel: where a part of it begins a window too early, it is 0.08.
+    dead_gain: f64 = 0.1,
+    /// Share of a wheel's turning that its records gain by themselves, from which on it is said.
+    /// Tuned: on 115 sound logs of all kinds and 150 mixed ones, none of which gains as much; records that
+    /// gain 0.02 to 0.3 rad/s are found in 46 of 48 logs.
+    min_runs_on_share: f64 = 2e-3,
+    /// Share of a column's range by which a speed leaps that wraps, at the least.
+    /// Derived: from near one end of the range to near the other; what the instrument saw decides.
+    min_wrap_share: f64 = 0.7,
+    /// Runs by which ids of the truth are shifted at the most.
+    /// Budgeted: files that are missing, and numbers that are counted from one.
+    max_run_shift: usize = 8,
+    /// Steps of a position's rounding that a wheel rolls between two poses, at the least, for the second one
+    /// to differ from the first.
+    /// Budgeted: of a robot that turns, poses move by less than its wheels roll.
+    min_held_steps: f64 = 3.0,
+    /// Share of the poses that repeat the one before though the wheels turn, from which on it is said.
+    /// Tuned: on 20 logs: poses that are held for up to two seconds in 5 to 30 % of the time cost no standard
+    /// deviation, since a fit leaves these out; poses that are logged twice or more cost up to three.
+    min_held_share: f64 = 0.4,
+    /// Seconds for which a pose is held at the most, from which on it is said.
+    /// Tuned: on 20 logs: five times 0.02 s cost 1.5 standard deviations at the most, twice 0.1 s cost up to
+    /// 2.4, and five times 0.1 s cost 2.7.
+    min_held_s: f64 = 0.09,
     /// Instants of a run at which its position or pose tells of the drive's parameters.
     /// Budgeted: the sides of a square have two each.
     instants: usize = 8,

@@ -2,8 +2,13 @@
 
 use dataset::Dataset;
 
+use crate::alignment::Clock;
 use crate::problems;
 use crate::session_check::SessionCheck;
+use crate::windows::Reading;
+
+/// Headings as they are read, and clocks that are one.
+const SOUND: (Reading, Clock) = (Reading::AS_IS, Clock { offset_s: 0.0, rate: 0.0 });
 
 /// Checks a session.
 pub(crate) fn checked(dataset: &Dataset) -> SessionCheck {
@@ -15,10 +20,31 @@ pub(crate) fn checked(dataset: &Dataset) -> SessionCheck {
     if problems::standstill::found(&mut check) {
         return check;
     }
+    problems::held_poses::found(&mut check);
+    problems::rate_rows::found(&mut check);
+    if problems::idle_columns::found(&mut check, dataset) {
+        return check;
+    }
+    problems::run_order::found(&mut check);
+    let before = check.problems.len();
+    let mut is_cut = problems::wheel_changes::found(&mut check, SOUND);
     check.matched = problems::clock::matched(&mut check);
+    let other = check.matched.as_ref().map(|of| (of.reading, of.clock)).filter(|of| *of != SOUND);
+    if let Some((reading, clock)) = other.filter(|_| !is_cut)
+        && problems::wheel_changes::found(&mut check, (reading, clock))
+    {
+        // Clocks were compared by records that do not belong together.
+        is_cut = true;
+        let change = check.problems.pop();
+        check.problems.truncate(before);
+        check.problems.extend(change);
+        check.matched = problems::clock::matched(&mut check);
+    }
     problems::wheels::found(&mut check);
     problems::truth_is_odometry::found(&mut check);
-    problems::rates::found(&mut check, dataset);
+    if !is_cut {
+        problems::rates::found(&mut check, dataset);
+    }
     problems::rounded_rates::found(&mut check, dataset);
     problems::coverage::found(&mut check);
     problems::coverage::unused(&mut check);

@@ -4,9 +4,10 @@ use kinematics::Side;
 
 use crate::kind::{Kind, MirroredAxis};
 use crate::settings::CHECKS;
+use crate::shown_numbers::{times, to_ms};
 
 /// The problem's name in JSON and in docs/check.md.
-pub(crate) const fn id(kind: &Kind) -> &'static str {
+pub(crate) fn id(kind: &Kind) -> &'static str {
     match kind {
         Kind::NothingMoves { .. } => "nothing_moves",
         Kind::TruthUnrelated { .. } => "truth_unrelated",
@@ -20,6 +21,7 @@ pub(crate) const fn id(kind: &Kind) -> &'static str {
         Kind::AxesMirrored { .. } => "axis_mirrored",
         Kind::WheelsExchanged { .. } => "wheels_exchanged",
         Kind::WheelBackwards { .. } => "wheel_backwards",
+        Kind::Record(fault) => fault.id(),
         Kind::LengthUnit { of_truth: true, .. } => "truth_length_unit",
         Kind::LengthUnit { .. } => "robot_length_unit",
         Kind::TicksPerTurn { .. } => "ticks_per_turn",
@@ -70,6 +72,7 @@ pub(crate) fn sentence(kind: &Kind, runs: Option<&[String]>) -> String {
             [side] => format!("the {} wheel counts backwards; change the sign of its column", side.name()),
             _ => "both wheels count backwards; change the sign of both columns".to_owned(),
         },
+        Kind::Record(fault) => fault.sentence(),
         Kind::LengthUnit { ratio, unit, of_truth } => length_unit(*ratio, *unit, *of_truth),
         Kind::TicksPerTurn { ratio, stated, simple } => ticks_per_turn(*ratio, *stated, *simple),
         Kind::OtherRobot { parameter, ratio } => {
@@ -228,24 +231,9 @@ fn turns(rad: f64) -> String {
     if turns < 1e6 { format!("{turns:.1}") } else { "more than a million".to_owned() }
 }
 
-/// A ratio as people read it. What is beyond all numbers, or below, has a bound.
-fn times(ratio: f64) -> String {
-    match ratio.abs() {
-        size if size >= f64::MAX => "more than 1e308 times".to_owned(),
-        size if size < f64::MIN_POSITIVE => "less than 1e-307 times".to_owned(),
-        1e-2..1e5 => format!("{ratio:.3} times"),
-        _ => format!("{ratio:.2e} times"),
-    }
-}
-
 /// Counts a revolution that would mend a ratio; `None` where none would.
 fn ticks_per_rev(stated: Option<f64>, ratio: f64) -> Option<f64> {
     stated.map(|stated| (stated / ratio).round()).filter(|ticks| (1.0..f64::MAX).contains(ticks))
-}
-
-/// An instant, seconds, to a millisecond.
-fn to_ms(t_s: f64) -> f64 {
-    (1e3 * t_s).round() / 1e3
 }
 
 /// At most so many runs are named one by one.

@@ -89,7 +89,8 @@ fn best_reading(check: &SessionCheck, as_is: Option<Explained>) -> (Reading, Opt
         .map_or((Reading::AS_IS, as_is), |(reading, found)| (reading, Some(found)))
 }
 
-fn is_decisive(found: &Explained, sound: &Explained) -> bool {
+/// Whether a reading explains the records beyond doubt where another does not.
+pub(crate) fn is_decisive(found: &Explained, sound: &Explained) -> bool {
     found.gain_over(sound) > CHECKS.min_gain
         && found.ratio_to(sound) < CHECKS.decisive_ratio
         && found.unexplained.iter().any(|share| *share < CHECKS.max_unexplained)

@@ -1,0 +1,208 @@
+//! Rows of rates that say nothing of the wheels: zeros where no message came, and speeds that wrap at the end
+//! of their numbers. They are restored for the checks that follow. Rates that were recorded may have been
+//! read as the counts that they are made of: rows are examined as rates in any log.
+
+use std::mem::take;
+
+use dataset::quantile;
+
+use crate::alignment::Clock;
+use crate::problem::{Problem, Severity, probability};
+use crate::record_fault::{Place, RecordFault};
+use crate::run_log::RunLog;
+use crate::session_check::SessionCheck;
+use crate::settings::CHECKS;
+use crate::windows::Reading;
+
+/// Two columns of rates of each run; a row's are those of the interval that ends there.
+type Columns = [Vec<f64>; 2];
+
+pub(crate) fn found(check: &mut SessionCheck) {
+    let m_per_rad = check.m_per_rad();
+    // Speed and yaw rate, in metres of a wheel.
+    let to_twist = |[left, right]: [f64; 2]| {
+        let (left_m_s, right_m_s) = (left * m_per_rad.left, right * m_per_rad.right);
+        [0.5 * (left_m_s + right_m_s), 0.5 * (right_m_s - left_m_s)]
+    };
+    let to_wheels = |[v, by]: [f64; 2]| [(v - by) / m_per_rad.left, (v + by) / m_per_rad.right];
+    let same = |rates: [f64; 2]| rates;
+    restore(check, zeros_filled, (&same, &same), |rows, from, share, gain| {
+        let severity = if share > CHECKS.max_rounded_share { Severity::Error } else { Severity::Warning };
+        // What a robot cannot do so often needs little of an instrument.
+        let is_certain = gain > CHECKS.min_gain || (rows >= CHECKS.min_rows && gain > 0.0);
+        is_certain.then_some((RecordFault::ZeroRates { from, rows, share }, severity))
+    });
+    let wraps = |rows: usize, from: Place, _: f64, gain: f64| {
+        (gain > CHECKS.min_gain).then_some((RecordFault::RatesWrap { from, rows }, Severity::Error))
+    };
+    if !restore(check, unwrapped, (&same, &same), wraps) {
+        restore(check, unwrapped, (&to_twist, &to_wheels), wraps);
+    }
+}
+
+/// From rates of both wheels to what was recorded, or back.
+type Change<'a> = &'a dyn Fn([f64; 2]) -> [f64; 2];
+
+/// Says what is wrong with rows, if the instrument's motion shows it, and restores them. Of the restored rows
+/// `say` is told their number, the first, their share of those in which the robot drives, and the nats by
+/// which the wheels then explain the motion better.
+fn restore(
+    check: &mut SessionCheck,
+    restored: fn(&mut [Columns]) -> Vec<(usize, usize)>,
+    (to, back): (Change<'_>, Change<'_>),
+    say: impl Fn(usize, Place, f64, f64) -> Option<(RecordFault, Severity)>,
+) -> bool {
+    let mut columns: Vec<Columns> = check.runs.iter().map(|run| rates(run, to)).collect();
+    let rows = restored(&mut columns);
+    let Some(&(run, row)) = rows.first() else { return false };
+    let sound = take(&mut check.runs);
+    check.runs = sound.iter().zip(&columns).map(|(run, columns)| with_rates(run, columns, back)).collect();
+    let then = check.explained(Reading::AS_IS, Clock::default());
+    let restored = std::mem::replace(&mut check.runs, sound);
+    let gain = match (check.explained(Reading::AS_IS, Clock::default()), then) {
+        (Some(as_is), Some(then)) => then.gain_over(&as_is),
+        _ => return false,
+    };
+    let drives = columns.iter().map(|[a, b]| a.iter().zip(b).filter(|(a, b)| **a != 0.0 || **b != 0.0).count());
+    let share = rows.len() as f64 / drives.sum::<usize>().max(1) as f64;
+    // A row's rates are of the interval that ends there, and the first row has none.
+    let of = &check.runs[run];
+    let from = Place { run: of.id.clone(), t_s: of.t_s[row + 1], row: row + 2 };
+    let Some((kind, severity)) = say(rows.len(), from, share, gain) else { return false };
+    check.problems.push(Problem::record(kind, severity, None, probability(gain.max(CHECKS.min_gain))));
+    check.runs = restored;
+    true
+}
+
+fn rates(run: &RunLog, to: Change<'_>) -> Columns {
+    let both = |row: usize| {
+        let row_s = run.t_s[row + 1] - run.t_s[row];
+        to([&run.wheels.left, &run.wheels.right].map(|angles| (angles[row + 1] - angles[row]) / row_s))
+    };
+    let rows: Vec<[f64; 2]> = (0..run.t_s.len().saturating_sub(1)).map(both).collect();
+    [0, 1].map(|number| rows.iter().map(|of| of[number]).collect())
+}
+
+fn with_rates(run: &RunLog, columns: &Columns, back: Change<'_>) -> RunLog {
+    let mut run = run.clone();
+    for (row, (first, second)) in columns[0].iter().zip(&columns[1]).enumerate() {
+        let row_s = run.t_s[row + 1] - run.t_s[row];
+        let [left, right] = back([*first, *second]);
+        run.wheels.left[row + 1] = run.wheels.left[row] + left * row_s;
+        run.wheels.right[row + 1] = run.wheels.right[row] + right * row_s;
+    }
+    run
+}
+
+/// Fills rows of zeros between two rows at speeds that the robot does not reach from standing in so few rows;
+/// runs and rows.
+fn zeros_filled(runs: &mut [Columns]) -> Vec<(usize, usize)> {
+    // What a speed usually changes by at the most from row to row, and no less than its least value, which is
+    // one count of a coarse encoder.
+    let most = [0, 1].map(|number: usize| {
+        let columns = || runs.iter().map(|columns| &columns[number]);
+        let steps = columns().flat_map(|column| column.windows(2)).filter(|pair| pair[0] != 0.0 && pair[1] != 0.0);
+        let usual = quantile(steps.map(|pair| (pair[1] - pair[0]).abs()), CHECKS.usual_step_quantile).unwrap_or(0.0);
+        let sizes = columns().flatten().filter(|of| **of != 0.0).map(|of| of.abs());
+        usual.max(sizes.fold(f64::INFINITY, f64::min))
+    });
+    let mut filled = Vec::new();
+    for (run, columns) in runs.iter_mut().enumerate() {
+        let count = columns[0].len();
+        let mut row = 1;
+        while row + 1 < count {
+            let is_zero = |row: usize| columns[0][row] == 0.0 && columns[1][row] == 0.0;
+            let end = (row..count).find(|at| !is_zero(*at)).unwrap_or(count);
+            let steps = (end - row + 1) as f64;
+            let is_impossible = |number: usize| {
+                let (before, after) = (columns[number][row - 1], columns[number][end]);
+                before * after > 0.0 && before.abs() + after.abs() > 2.0 * steps * most[number]
+            };
+            if (row + 1..count).contains(&end) && (is_impossible(0) || is_impossible(1)) {
+                for column in columns.iter_mut() {
+                    let (before, after) = (column[row - 1], column[end]);
+                    (row..end).for_each(|at| {
+                        column[at] = before + (after - before) * (at - row + 1) as f64 / steps;
+                    });
+                }
+                filled.extend((row..end).map(|at| (run, at)));
+            }
+            row = end + 1;
+        }
+    }
+    filled
+}
+
+/// Goes on beyond the ends of a symmetric range where a column leaps from near one end to near the other;
+/// runs and rows beyond.
+fn unwrapped(runs: &mut [Columns]) -> Vec<(usize, usize)> {
+    let mut rows = Vec::new();
+    for number in 0..2 {
+        let all = || runs.iter().flat_map(|columns| &columns[number]);
+        let (low, high) = all().fold((0.0_f64, 0.0_f64), |(low, high), of| (low.min(*of), high.max(*of)));
+        let range = high - low;
+        if (high + low).abs() > (1.0 - CHECKS.min_wrap_share) * range {
+            continue;
+        }
+        for (run, columns) in runs.iter_mut().enumerate() {
+            let (mut turns, mut before) = (0.0, 0.0);
+            let beyond = columns[number].iter().map(|value| {
+                let step = value - before;
+                before = *value;
+                turns -= if step.abs() > CHECKS.min_wrap_share * range { step.signum() } else { 0.0 };
+                turns
+            });
+            let beyond: Vec<f64> = beyond.collect();
+            // A wheel that is reversed leaps too, and does not come back.
+            if beyond.last().is_none_or(|turns| *turns != 0.0) {
+                continue;
+            }
+            for (row, turns) in beyond.into_iter().enumerate().filter(|(_, turns)| *turns != 0.0) {
+                columns[number][row] += turns * range;
+                rows.push((run, row));
+            }
+        }
+    }
+    rows.sort_unstable();
+    rows.dedup();
+    rows
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A robot that speeds up to 0.5 and stops, by rows.
+    fn driven() -> Vec<f64> {
+        (0..200).map(|row| (0.02 * f64::from(row.min(199 - row))).min(0.5)).collect()
+    }
+
+    #[test]
+    fn zeros_at_speed_are_filled_and_a_robot_that_stops_is_not() {
+        let mut zeros = [[driven(), driven()]];
+        for row in [100, 101, 150] {
+            zeros[0].iter_mut().for_each(|column| column[row] = 0.0);
+        }
+        assert_eq!(zeros_filled(&mut zeros), [(0, 100), (0, 101), (0, 150)]);
+        assert_eq!(zeros[0][0], driven());
+        // One that stops and goes on, and counts of a coarse encoder. Rejects every zero between speeds.
+        let twice = [driven(), driven()].concat();
+        let coarse: Vec<f64> = (0..200).map(|row| f64::from(u8::from(row % 3 == 0))).collect();
+        for sound in [twice, coarse] {
+            assert!(zeros_filled(&mut [[sound.clone(), sound]]).is_empty());
+        }
+    }
+
+    #[test]
+    fn speeds_that_wrap_go_on_and_a_wheel_that_is_reversed_does_not() {
+        let wrapped: Vec<f64> = driven().iter().map(|of| if *of > 0.4 { of - 0.8 } else { *of }).collect();
+        let mut runs = [[wrapped, vec![0.0; 200]]];
+        assert!(!unwrapped(&mut runs).is_empty());
+        let off = runs[0][0].iter().zip(driven()).map(|(found, is)| (found - is).abs()).fold(0.0, f64::max);
+        // The range is known to a step of the speed.
+        assert!(off < 0.021, "{off}");
+        let reversed: Vec<f64> =
+            driven().iter().enumerate().map(|(row, of)| if row > 100 { -of } else { *of }).collect();
+        assert!(unwrapped(&mut [[reversed, vec![0.0; 200]]]).is_empty());
+    }
+}
