@@ -201,13 +201,11 @@ pub(crate) fn of_failed_checks(
     refused: impl Iterator<Item = &'static str>,
 ) -> Option<Finding> {
     let failed: Vec<Check> = checked.checks.iter().filter(|test| !test.passes).map(|test| test.check.clone()).collect();
-    if !checked.checks.iter().any(|test| !test.passes && test.p_value < FINDINGS.failed_checks_level) {
-        return None;
-    }
     // Heavy tails have causes of their own: the p-value is that of the tests of dependence.
     let least = |tests: &mut dyn Iterator<Item = &TestResult>| tests.map(|test| test.p_value).reduce(f64::min);
     let worst = least(&mut checked.checks.iter().filter(|test| test.shows_dependence()))
         .or_else(|| least(&mut checked.checks.iter().filter(|test| !test.passes)));
+    let worst = worst.filter(|_| !failed.is_empty())?;
     // Residuals that are correlated with the ones before them may be errors of the instrument that last.
     // Tests of dependence take errors to be independent, and fail too then, if less plainly.
     let of_correlation = least(&mut checked.checks.iter().filter(|test| test.check.is_of_whiteness())).unwrap_or(1.0);
@@ -220,7 +218,7 @@ pub(crate) fn of_failed_checks(
     let refused = refused.filter(|_| of_dependence).map(Cause::Effect);
     // Whatever else was left out of the model is as likely, and has no name.
     let causes = [Cause::Unknown].into_iter().chain(errors).chain(refused).collect();
-    Some(of_causes(causes, worst?, BTreeMap::new(), Basis::FailedTests(failed)))
+    Some(of_causes(causes, worst, BTreeMap::new(), Basis::FailedTests(failed)))
 }
 
 /// Doubts mean effects: one uncatalogued term explains as much, with these odds over them.

@@ -21,10 +21,6 @@ rules::settings! {
     /// Probability. Level of dependence on something recorded that no noise effect explains.
     /// Tuned: by hand; no record of what on.
     dependence_beyond_noise_level: f64 = 1e-8,
-    /// Probability. Level of failed checks that nothing explains, as a finding. A check that fails at a higher
-    /// one is reported as a check alone.
-    /// Tuned: on 907 logs of seeds 63001 to 63003 (docs/ablation.md); sound robots' checks fail down to 4e-7.
-    failed_checks_level: f64 = 1e-6,
     /// Counts per revolution. Least resolution of the encoder on which the simulated controller regulates.
     /// Tuned: by hand; no record of what on.
     min_controller_counts: f64 = 40_000.0,

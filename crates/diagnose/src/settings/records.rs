@@ -29,8 +29,8 @@ rules::settings! {
     /// Budgeted: errors of rounded turns are alike, and the estimate is less certain than it says.
     min_clock_sigmas: f64 = 6.0,
     /// Natural logarithm. Likelihood that an offset gains at the least.
-    /// Tuned: on 907 logs of seeds 63001 to 63003 (docs/ablation.md); coarse counts of slow robots gain up to
-    /// 26 with no offset, clocks that are off gain hundreds.
+    /// Tuned: on 907 logs of seeds 63001 to 63003, where coarse counts of slow robots gain up to 26 with no
+    /// offset, and clocks that are off hundreds; of 486 logs of 67001 and 67002 two lose a false offset.
     min_clock_gain: f64 = 40.0,
     /// Fraction. Share of the turns and distances between poses that counts leave unexplained where their
     /// clock is right; of counts that leave more, nothing is said.

@@ -141,9 +141,9 @@ fn failed_checks_are_reported_where_nothing_explains_them() {
         let number = before.len();
         failed_checks(&of, before).len() > number
     };
-    assert!(reported(1e-7, vec![], &[]) && reported(1e-7, vec![mean("slip_speed", 9.0)], &[]));
+    assert!(reported(1e-6, vec![], &[]) && reported(1e-6, vec![mean("slip_speed", 9.0)], &[]));
     // Noise explains a dependence, unless that is too plain; what is in no catalogue explains all.
-    assert!(!reported(1e-7, vec![scatters(5.0)], &[]) && reported(1e-9, vec![scatters(5.0)], &[]));
+    assert!(!reported(1e-6, vec![scatters(5.0)], &[]) && reported(1e-9, vec![scatters(5.0)], &[]));
     let unknown = of_causes(vec![], 1e-9, BTreeMap::new(), Basis::Autocorrelated(0.3, ErrorsAtRest::Autocorrelated));
     assert!(!reported(1e-9, vec![unknown], &[]));
     // So do counts that are restored roughly, and not every fault.
