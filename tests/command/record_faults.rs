@@ -358,9 +358,9 @@ fn outcome(number: usize, kind: &str, seed: u64, with_fit: bool) -> Option<Outco
     Some(Outcome { is_named, z, line })
 }
 
-/// Three logs of each fault, of which one may have hardly any motion after it, and in the campaign many; with
-/// YAIR_COSTS=1 those whose lengths are off by a standard deviation or more, or are refused without the cause,
-/// are counted apart.
+/// Three logs of each fault, of which one may have hardly any motion after it; in the campaign, many. With
+/// YAIR_COSTS=1 those whose lengths are off by a standard deviation or more, or are refused without the
+/// cause, are counted apart.
 #[test]
 fn faults_of_records_are_named_with_their_place() {
     let (logs, seed, with_fit) = (number("YAIR_LOGS", 0), number("YAIR_SEED", 900), number("YAIR_COSTS", 0) > 0);
