@@ -27,7 +27,7 @@ pub struct Measure {
     pub met: Option<bool>,
 }
 
-/// How many of some there are of which something holds.
+/// Hits among cases.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Counted {
     pub(crate) hits: usize,

@@ -109,7 +109,7 @@ rules::settings! {
     /// Spans that a run has one after another at the least.
     /// Budgeted: a period that begins anew spoils few of them.
     min_spans: usize = 8,
-    /// Spans of which phases are taken.
+    /// Number. Spans whose phases are compared.
     /// Budgeted: a mean over so many is known to 3 % of what one scatters by.
     phases_taken: usize = 1000,
     /// Ticks by which two periods that number the rows alike are apart at the end of a log.
@@ -182,8 +182,8 @@ rules::settings! {
     /// Steps of that by which it is sought first.
     /// Derived: a factor of 2.2 in the mean delay.
     first_mean_step: f64 = 16.0,
-    /// Periods. A longer mean delay is none of single rows: a log that is written in blocks has one stamp a
-    /// block.
+    /// Periods. Longest mean delay of rows that are received one by one; a log that is written in blocks has
+    /// one stamp a block.
     /// Budgeted: memory and time; the grid grows with the delay.
     max_mean_delay: f64 = 40.0,
     /// Share of the period. A row that comes so soon behind another was held up by it.

@@ -10,6 +10,7 @@ use dataset::{median, quantile};
 use kinematics::{Side, Wheels};
 
 use crate::alignment::Paired;
+use crate::regression::cauchy;
 use crate::settings::CHECKS;
 
 /// A span of windows in which the wheels' columns have other gains than outside of it.
@@ -314,7 +315,7 @@ pub(crate) fn robustly(rows: &[Row], is_inside: &[bool]) -> Option<Fit> {
         let scale = CHECKS.cauchy_medians * median(outer)?
             + 1e-3 * median(rows.iter().map(|(_, turned)| turned.abs()))?
             + f64::MIN_POSITIVE;
-        weights.iter_mut().zip(&left).for_each(|(weight, left)| *weight = 1.0 / (1.0 + (left / scale).powi(2)));
+        weights.iter_mut().zip(&left).for_each(|(weight, left)| *weight = cauchy(*left, scale));
         let predicted = predicted.iter().map(|of| of.abs()).collect();
         found = Some(Fit { by, gain, sigma, left, predicted, weights: weights.clone() });
     }

@@ -7,7 +7,7 @@
 use kinematics::{Side, Wheels};
 
 use crate::alignment::Paired;
-use crate::regression::{Moments, robustly, slope};
+use crate::regression::{Moments, jackknife_sigma, robustly, slope, without_each_group};
 use crate::settings::CHECKS;
 
 /// The drive: metres a radian of each wheel (negative: it counts backwards) and the separation (negative: the
@@ -42,22 +42,8 @@ impl GeometryEstimate {
     /// Of windows with poses; `None` where they do not determine all three.
     pub(crate) fn of(pairs: &[Paired]) -> Option<Self> {
         let whole = Self::once(pairs)?;
-        let group = pairs.len().div_ceil(CHECKS.groups);
-        let without: Vec<Self> = (0..CHECKS.groups)
-            .filter_map(|number| {
-                let (from, to) = ((number * group).min(pairs.len()), ((number + 1) * group).min(pairs.len()));
-                Self::once(&[&pairs[..from], &pairs[to..]].concat())
-            })
-            .collect();
-        if without.len() < CHECKS.groups {
-            return None;
-        }
-        let sigma = |of: fn(&Self) -> f64| {
-            let count = without.len() as f64;
-            let mean = without.iter().map(of).sum::<f64>() / count;
-            let square: f64 = without.iter().map(|one| (of(one) - mean).powi(2)).sum();
-            (square * (count - 1.0) / count).sqrt() / of(&whole).abs()
-        };
+        let without = without_each_group(pairs, Self::once)?;
+        let sigma = |of: fn(&Self) -> f64| jackknife_sigma(&without, of) / of(&whole).abs();
         let sigma = [sigma(|one| one.m_per_rad.left), sigma(|one| one.m_per_rad.right), sigma(|one| one.separation_m)];
         Some(Self { sigma, ..whole })
     }

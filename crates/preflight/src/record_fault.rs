@@ -4,6 +4,7 @@ use std::fmt::{self, Display, Formatter};
 
 use kinematics::Side;
 
+use crate::run_log::RunLog;
 use crate::settings::CHECKS;
 use crate::shown_numbers::{times, to_ms};
 
@@ -57,6 +58,13 @@ pub(crate) struct Place {
     pub(crate) t_s: f64,
     /// From one on.
     pub(crate) row: usize,
+}
+
+impl Place {
+    /// The first row from an instant on.
+    pub(crate) fn at(run: &RunLog, t_s: f64) -> Self {
+        Self { run: run.id.clone(), t_s, row: run.t_s.partition_point(|row_s| *row_s < t_s) + 1 }
+    }
 }
 
 impl Display for Place {

@@ -61,6 +61,29 @@ impl Moments {
     }
 }
 
+/// Cauchy's weight of a residual: a half at the scale.
+pub(crate) fn cauchy(residual: f64, scale: f64) -> f64 {
+    1.0 / (1.0 + (residual / scale).powi(2))
+}
+
+/// A value of windows without each of some groups of consecutive ones in turn; `None` where one is missing.
+pub(crate) fn without_each_group<W: Clone, V>(windows: &[W], of: impl Fn(&[W]) -> Option<V>) -> Option<Vec<V>> {
+    let group = windows.len().div_ceil(CHECKS.groups);
+    let without = |number: usize| {
+        let (from, to) = ((number * group).min(windows.len()), ((number + 1) * group).min(windows.len()));
+        of(&[&windows[..from], &windows[to..]].concat())
+    };
+    (0..CHECKS.groups).map(without).collect()
+}
+
+/// The jackknife's standard deviation of a value, by what it is without each group.
+pub(crate) fn jackknife_sigma<V>(without: &[V], of: impl Fn(&V) -> f64) -> f64 {
+    let count = without.len() as f64;
+    let mean = without.iter().map(&of).sum::<f64>() / count;
+    let square: f64 = without.iter().map(|one| (of(one) - mean).powi(2)).sum();
+    (square * (count - 1.0) / count).sqrt()
+}
+
 /// Regresses outcomes on turns; once without reweighting where `passes` is 1.
 pub(crate) fn regress(pairs: &[(Wheels<f64>, f64)], passes: usize) -> Option<Regression> {
     let mut weights = vec![1.0; pairs.len()];
@@ -88,7 +111,7 @@ pub(crate) fn regress(pairs: &[(Wheels<f64>, f64)], passes: usize) -> Option<Reg
         if pass + 1 < passes {
             let scale = CHECKS.cauchy_medians * median(sizes)? + f64::MIN_POSITIVE;
             for (weight, pair) in weights.iter_mut().zip(pairs) {
-                *weight = 1.0 / (1.0 + (residual(pair) / scale).powi(2));
+                *weight = cauchy(residual(pair), scale);
             }
         }
     }
@@ -124,7 +147,7 @@ pub(crate) fn slope(pairs: &[(f64, f64)]) -> Option<(f64, f64, f64, f64)> {
         if pass + 1 < CHECKS.robust_passes {
             let scale = CHECKS.cauchy_medians * median(sizes)? + f64::MIN_POSITIVE;
             for (weight, pair) in weights.iter_mut().zip(pairs) {
-                *weight = 1.0 / (1.0 + (residual(pair) / scale).powi(2));
+                *weight = cauchy(residual(pair), scale);
             }
         }
     }

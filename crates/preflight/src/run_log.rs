@@ -131,6 +131,11 @@ impl RunLog {
         Some(Self { wheels: by_instant_rates_rad(&self.t_s, run, robot)?, ..self.clone() })
     }
 
+    /// Whether the instrument sees headings.
+    pub(crate) fn sees_headings(&self) -> bool {
+        !self.displacements.is_empty() || self.truth.iter().any(|sample| sample.theta_rad().is_some())
+    }
+
     /// What lies between two instants alone.
     pub(crate) fn keep(&mut self, from_s: f64, to_s: f64) {
         let rows = self.t_s.partition_point(|t_s| *t_s < from_s)..self.t_s.partition_point(|t_s| *t_s <= to_s);

@@ -58,9 +58,7 @@ pub(crate) enum Measured {
 
 /// All windows of the runs, at most so many; outliers of the instrument are left out.
 pub(crate) fn windows(runs: &[RunLog], reading: Reading, most: usize) -> (Vec<Window>, Measured) {
-    let with_heading =
-        |run: &&RunLog| !run.displacements.is_empty() || run.truth.iter().any(|sample| sample.theta_rad().is_some());
-    let poses = 2 * runs.iter().filter(with_heading).count() >= runs.len();
+    let poses = 2 * runs.iter().filter(|run| run.sees_headings()).count() >= runs.len();
     let mut all = Vec::new();
     for (number, run) in runs.iter().enumerate() {
         if poses {

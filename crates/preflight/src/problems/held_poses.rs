@@ -30,8 +30,7 @@ pub(crate) fn found(check: &mut SessionCheck) {
                 if since_s.is_nan() {
                     since_s = pair[0].t_s;
                 }
-                let row = run.t_s.partition_point(|row_s| *row_s < pair[0].t_s) + 1;
-                first.get_or_insert_with(|| Place { run: run.id.clone(), t_s: pair[0].t_s, row });
+                first.get_or_insert_with(|| Place::at(run, pair[0].t_s));
                 held_s.push(pair[1].t_s - since_s);
             } else {
                 since_s = f64::NAN;

@@ -18,7 +18,7 @@ pub(crate) fn found(check: &mut SessionCheck, dataset: &Dataset) -> bool {
     let mut say =
         |fault: RecordFault, severity: Severity| check.problems.push(Problem::record(fault, severity, None, 0.999));
     if let Some(rate_rad_s) = constant_gyro(dataset).filter(|_| check.runs.iter().any(wheels_turn_it)) {
-        let is_alone = check.runs.iter().all(|run| !sees_headings(run));
+        let is_alone = check.runs.iter().all(|run| !run.sees_headings());
         let severity = if is_alone { Severity::Error } else { Severity::Warning };
         say(RecordFault::ConstantGyro { rate_rad_s }, severity);
     }
@@ -71,10 +71,6 @@ fn wheels_turn_it(run: &RunLog) -> bool {
     extent(apart) > CHECKS.min_turning_rad
 }
 
-fn sees_headings(run: &RunLog) -> bool {
-    !run.displacements.is_empty() || run.truth.iter().any(|sample| sample.theta_rad().is_some())
-}
-
 /// Does the instrument see the robot turn? Positions alone do by a path that is not straight.
 fn is_seen_turning(run: &RunLog) -> bool {
     let mut headings = run.truth.iter().filter_map(dataset::TruthSample::theta_rad);
@@ -95,7 +91,7 @@ fn is_seen_turning(run: &RunLog) -> bool {
         let (dx_m, dy_m) = (last.x_m - first.x_m, last.y_m - first.y_m);
         ((of.x_m - first.x_m) * dy_m - (of.y_m - first.y_m) * dx_m) / dx_m.hypot(dy_m).max(f64::MIN_POSITIVE)
     };
-    !sees_headings(run) && far > 0.0 && extent(run.truth.iter().map(across)) > 0.3 * far
+    !run.sees_headings() && far > 0.0 && extent(run.truth.iter().map(across)) > 0.3 * far
 }
 
 fn extent(values: impl Iterator<Item = f64>) -> f64 {

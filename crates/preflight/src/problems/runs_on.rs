@@ -7,6 +7,7 @@ use crate::alignment::{Paired, explain};
 use crate::gain_change::{Row, robustly};
 use crate::problem::{Problem, Severity, probability};
 use crate::record_fault::RecordFault;
+use crate::regression::{jackknife_sigma, without_each_group};
 use crate::session_check::SessionCheck;
 use crate::settings::CHECKS;
 use crate::windows::Measured;
@@ -23,18 +24,8 @@ impl RunsOn {
     /// Of windows with poses.
     pub(crate) fn of(pairs: &[Paired], m_per_rad: Wheels<f64>) -> Option<Self> {
         let whole = rates(pairs)?;
-        let group = pairs.len().div_ceil(CHECKS.groups);
-        let without: Vec<Wheels<f64>> = (0..CHECKS.groups)
-            .filter_map(|number| {
-                let (from, to) = ((number * group).min(pairs.len()), ((number + 1) * group).min(pairs.len()));
-                rates(&[&pairs[..from], &pairs[to..]].concat())
-            })
-            .collect();
-        let count = without.len() as f64;
-        let sigma = Wheels::from_sides(|side| {
-            let mean = without.iter().map(|of| of[side]).sum::<f64>() / count;
-            (without.iter().map(|of| (of[side] - mean).powi(2)).sum::<f64>() * (count - 1.0) / count).sqrt()
-        });
+        let without = without_each_group(pairs, rates)?;
+        let sigma = Wheels::from_sides(|side| jackknife_sigma(&without, |of| of[side]));
         let certain = |rate: f64, sigma: f64| if rate.abs() > CHECKS.certain_sigmas * sigma { rate } else { 0.0 };
         let rate_rad_s = whole.zip_with(sigma, certain);
         let undone = undone(pairs, rate_rad_s);
@@ -43,7 +34,7 @@ impl RunsOn {
         let found = Self { rate_rad_s, nats: then.gain_over(&as_is) };
         // Records by another clock have a part that goes by time, and are not explained by it.
         let is_explained = then.unexplained.iter().all(|share| *share < CHECKS.max_left_by_fix);
-        (without.len() == CHECKS.groups && is_explained && found.nats > CHECKS.min_gain).then_some(found)
+        (is_explained && found.nats > CHECKS.min_gain).then_some(found)
     }
 
     /// Says the rates that matter, and takes them out of the log; whether one does.

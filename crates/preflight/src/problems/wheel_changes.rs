@@ -34,10 +34,7 @@ pub(crate) fn found(check: &mut SessionCheck, (reading, clock): (Reading, Clock)
     let Some((mut change, sides)) = found else { return false };
     let is_known = part_at_fault(&mut change, &sides, &pairs, check.m_per_rad());
     let Range { start, end } = change.span;
-    let place = |window: &Paired, stamp_s: f64| {
-        let (run, t_s) = (&check.runs[window.window.run], clock.log_s(stamp_s));
-        Place { run: run.id.clone(), t_s, row: run.t_s.partition_point(|row_s| *row_s < t_s) + 1 }
-    };
+    let place = |pair: &Paired, stamp_s: f64| Place::at(&check.runs[pair.window.run], clock.log_s(stamp_s));
     let from = (start > 0).then(|| place(&pairs[start], pairs[start].window.from_s));
     let until = (end < pairs.len()).then(|| place(&pairs[end - 1], pairs[end - 1].window.to_s));
     let mut runs: Vec<String> = pairs[start..end].iter().map(|pair| check.runs[pair.window.run].id.clone()).collect();
