@@ -36,13 +36,8 @@ pub(crate) fn found(check: &mut SessionCheck, dataset: &Dataset) -> bool {
     let Some(explained) = check.explained(Reading::AS_IS, Clock::default()) else { return false };
     let is_dead = explained.unexplained.iter().any(|share| *share > CHECKS.max_left_by_fix);
     if is_dead {
-        let kind = RecordFault::WheelChange(WheelChange {
-            sides: vec![side],
-            gain: 0.0,
-            from: None,
-            until: None,
-            is_known: true,
-        });
+        let throughout = WheelChange { sides: vec![side], gain: 0.0, from: None, until: None, is_known: true };
+        let kind = RecordFault::WheelChange(throughout);
         check.problems.push(Problem::record(kind, Severity::Error, None, 0.99));
     }
     is_dead
