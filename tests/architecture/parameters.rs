@@ -11,9 +11,6 @@ use syn::{FnArg, Pat, Signature};
 
 use crate::{files, root, text};
 
-/// Crates whose functions still take tuples apart.
-const NOT_YET: [&str; 2] = ["diagnose", "preflight"];
-
 /// Named functions that take a tuple apart in their parameters.
 #[derive(Default)]
 struct Found(Vec<String>);
@@ -39,9 +36,7 @@ fn named_functions_take_no_tuples_apart_in_their_parameters() {
     let mut folders = vec!["src".to_owned()];
     for entry in fs::read_dir(root().join("crates")).expect("the crates stand here") {
         let name = entry.expect("readable").file_name().to_string_lossy().into_owned();
-        if !NOT_YET.contains(&&name[..]) {
-            folders.push(format!("crates/{name}/src"));
-        }
+        folders.push(format!("crates/{name}/src"));
     }
     let is_rust = |path: &Path| path.extension().is_some_and(|extension| extension == "rs");
     let mut complaints = Vec::new();

@@ -85,7 +85,8 @@ fn asked(datasets: &[Dataset]) -> String {
     line("possible", &[is_physical(&model, 0), is_physical(&model, 1)]);
     line("next", &[0, 1, 2].map(|component| residual_persistence(&alone, component)));
     let checked = check(&model);
-    line("checks", &(checked.checks, checked.correlation, checked.outliers, checked.autocorrelated));
+    let correlation = (checked.correlation.coefficient, checked.correlation.sigmas);
+    line("checks", &(checked.checks, correlation, checked.outliers, checked.autocorrelated));
     line("lack of fit", &lack_of_fit(&base, &of_latency, &[0]));
     // Profiles of residuals are long, and those of one robot go through what makes all.
     if datasets.len() == 1 && datasets[0].robot.ticks_per_rev.is_none() {

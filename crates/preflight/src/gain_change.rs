@@ -27,8 +27,12 @@ pub(crate) struct GainChange {
     pub(crate) unexplained: f64,
 }
 
-/// A window of one wheel: what the instrument saw, in root mean squares, and what the wheel turned.
-pub(crate) type Row = ([f64; 3], f64);
+/// A window in a regression: regressors, each over its usual size, and the outcome; here, what the instrument
+/// saw, and what one wheel turned, radians.
+pub(crate) struct Row {
+    pub(crate) regressors: [f64; 3],
+    pub(crate) outcome: f64,
+}
 
 /// Weighted second moments of a wheel's windows: of what was seen, with the turns, and of the turns.
 #[derive(Debug, Clone, Copy, Default)]
@@ -39,14 +43,14 @@ struct Moments {
 }
 
 impl Moments {
-    fn with(mut self, (seen, turned): &Row, weight: f64) -> Self {
+    fn with(mut self, Row { regressors, outcome }: &Row, weight: f64) -> Self {
         for i in 0..3 {
             for j in 0..3 {
-                self.seen[i][j] += weight * seen[i] * seen[j];
+                self.seen[i][j] += weight * regressors[i] * regressors[j];
             }
-            self.cross[i] += weight * seen[i] * turned;
+            self.cross[i] += weight * regressors[i] * outcome;
         }
-        self.turned += weight * turned * turned;
+        self.turned += weight * outcome * outcome;
         self
     }
 
@@ -140,7 +144,10 @@ fn moving(pairs: &[Paired]) -> (Vec<usize>, Wheels<Vec<Row>>) {
         |pair: &Paired| (0..3).all(|part| seen(pair)[part].abs() < CHECKS.outlying_motion_ratio * scale[part]);
     let places: Vec<usize> = (0..pairs.len()).filter(|at| moves(&pairs[*at]) && is_sound(&pairs[*at])).collect();
     let row = |side: Side| {
-        let of = |at: &usize| ([0, 1, 2].map(|part| seen(&pairs[*at])[part] / scale[part]), pairs[*at].moved[side]);
+        let of = |at: &usize| Row {
+            regressors: [0, 1, 2].map(|part| seen(&pairs[*at])[part] / scale[part]),
+            outcome: pairs[*at].moved[side],
+        };
         places.iter().map(of).collect()
     };
     let rows = Wheels { left: row(Side::Left), right: row(Side::Right) };
@@ -157,10 +164,10 @@ pub(crate) fn gain_change(pairs: &[Paired]) -> Option<GainChange> {
     let borders: Vec<usize> = (1..places.len()).filter(|at| run(*at) != run(at - 1)).collect();
     let even = Wheels::both(vec![1.0; places.len()]);
     // Outliers of the instrument count for less once a first span is known.
-    let first = best_span(&rows, &even, &borders)?;
-    let weights = Wheels { left: judged(&rows.left, first)?.weights, right: judged(&rows.right, first)?.weights };
+    let (from, to) = best_span(&rows, &even, &borders)?;
+    let weights = Wheels { left: judged(&rows.left, from, to)?.weights, right: judged(&rows.right, from, to)?.weights };
     let (from, to) = best_span(&rows, &weights, &borders)?;
-    let found = Wheels { left: judged(&rows.left, (from, to))?, right: judged(&rows.right, (from, to))? };
+    let found = Wheels { left: judged(&rows.left, from, to)?, right: judged(&rows.right, from, to)? };
     // Where both wheels change alike, each part may have motions of its own, whose coefficients the other
     // part hardly tells; a wheel that changes alone has the other one to show that it does.
     let is_doubtful = |of: &Judged| (of.gain * of.exchanged - 1.0).abs() > CHECKS.max_left_by_fix;
@@ -251,14 +258,14 @@ struct Judged {
     weights: Vec<f64>,
 }
 
-fn judged(rows: &[Row], (from, to): (usize, usize)) -> Option<Judged> {
+fn judged(rows: &[Row], from: usize, to: usize) -> Option<Judged> {
     let is_inside: Vec<bool> = (0..rows.len()).map(|at| (from..to).contains(&at)).collect();
     let one = robustly(rows, &vec![false; rows.len()])?;
     let two = robustly(rows, &is_inside)?;
     let exchanged = robustly(rows, &is_inside.iter().map(|is| !is).collect::<Vec<_>>())?.gain;
     let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
     // Below a thousandth of the turning nothing is compared.
-    let least = 1e-3 * mean(&rows.iter().map(|(_, turned)| turned.abs()).collect::<Vec<_>>());
+    let least = 1e-3 * mean(&rows.iter().map(|row| row.outcome.abs()).collect::<Vec<_>>());
     // A dead wheel has no residual, and what was seen errs all the same. Inside, a gain that holds for
     // straights and not for turns explains nothing.
     let outside = two.left[..from].iter().chain(&two.left[to..]).copied();
@@ -299,9 +306,9 @@ pub(crate) fn robustly(rows: &[Row], is_inside: &[bool]) -> Option<Fit> {
         let (square, cross) = inside.predicted(by);
         let gain = if square > 0.0 { cross / square } else { 1.0 };
         let predicted: Vec<f64> =
-            rows.iter().map(|(seen, _)| (0..3).map(|part| by[part] * seen[part]).sum::<f64>()).collect();
+            rows.iter().map(|row| (0..3).map(|part| by[part] * row.regressors[part]).sum::<f64>()).collect();
         let expected = predicted.iter().zip(is_inside).map(|(of, inside)| if *inside { gain * of } else { *of });
-        let left: Vec<f64> = rows.iter().zip(expected).map(|((_, turned), of)| (turned - of).abs()).collect();
+        let left: Vec<f64> = rows.iter().zip(expected).map(|(row, of)| (row.outcome - of).abs()).collect();
         // Of both, since a dead wheel has no residual, and what was seen errs all the same.
         let var = |of: bool| {
             let chosen = || weights.iter().zip(&left).zip(is_inside).filter(move |(_, inside)| **inside == of);
@@ -313,7 +320,7 @@ pub(crate) fn robustly(rows: &[Row], is_inside: &[bool]) -> Option<Fit> {
         let sigma = if square > 0.0 { (var(true).max(var(false)) / square).sqrt() } else { f64::INFINITY };
         let outer = left.iter().zip(is_inside).filter(|(_, inside)| !**inside).map(|(left, _)| *left);
         let scale = CHECKS.cauchy_medians * median(outer)?
-            + 1e-3 * median(rows.iter().map(|(_, turned)| turned.abs()))?
+            + 1e-3 * median(rows.iter().map(|row| row.outcome.abs()))?
             + f64::MIN_POSITIVE;
         weights.iter_mut().zip(&left).for_each(|(weight, left)| *weight = cauchy(*left, scale));
         let predicted = predicted.iter().map(|of| of.abs()).collect();

@@ -7,9 +7,6 @@ use crate::problems;
 use crate::session_check::SessionCheck;
 use crate::windows::Reading;
 
-/// Headings as they are read, and clocks that are one.
-const SOUND: (Reading, Clock) = (Reading::AS_IS, Clock { offset_s: 0.0, rate: 0.0 });
-
 /// Checks a session.
 pub(crate) fn checked(dataset: &Dataset) -> SessionCheck {
     let mut check = SessionCheck::new(&dataset.session());
@@ -27,11 +24,12 @@ pub(crate) fn checked(dataset: &Dataset) -> SessionCheck {
     }
     problems::run_order::found(&mut check);
     let before = check.problems.len();
-    let mut is_cut = problems::wheel_changes::found(&mut check, SOUND);
+    // With headings as they are read, and clocks that are one.
+    let mut is_cut = problems::wheel_changes::found(&mut check, Reading::AS_IS, Clock::default());
     check.matched = problems::clock::matched(&mut check);
-    let other = check.matched.as_ref().map(|of| (of.reading, of.clock)).filter(|of| *of != SOUND);
-    if let Some((reading, clock)) = other.filter(|_| !is_cut)
-        && problems::wheel_changes::found(&mut check, (reading, clock))
+    let other = check.matched.as_ref().map(|of| (of.reading, of.clock));
+    if let Some((reading, clock)) = other.filter(|of| !is_cut && *of != (Reading::AS_IS, Clock::default()))
+        && problems::wheel_changes::found(&mut check, reading, clock)
     {
         // Clocks were compared by records that do not belong together.
         is_cut = true;

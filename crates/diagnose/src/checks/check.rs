@@ -106,3 +106,12 @@ pub(crate) enum ResidualPersistence {
     /// Neither is significant.
     Undecided,
 }
+
+/// Correlation of innovations that follow each other.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Correlation {
+    /// At lag one.
+    pub(crate) coefficient: f64,
+    /// The same of all lags, in standard errors.
+    pub(crate) sigmas: f64,
+}

@@ -8,7 +8,7 @@
 use estimation::{InnovationComponent, ModelFit, Segment, WHITENESS_Z};
 
 use crate::candidates::candidate::terms;
-use crate::checks::check::{Check, Component, ResidualPersistence, TestResult};
+use crate::checks::check::{Check, Component, Correlation, ResidualPersistence, TestResult};
 use crate::checks::covariate_tests::covariates;
 use crate::fits::augmented_model::AugmentedModel;
 use crate::fits::null_distribution::{NullDistribution, among_simulated, beyond_simulated};
@@ -21,8 +21,7 @@ pub(crate) struct Checked {
     /// Displacements are autocorrelated, if less plainly than poses would be after a filter.
     pub(crate) autocorrelated: bool,
     pub(crate) checks: Vec<TestResult>,
-    /// Correlation of innovations that follow each other: coefficient at lag one, and standard errors.
-    pub(crate) correlation: (f64, f64),
+    pub(crate) correlation: Correlation,
     pub(crate) outliers: Outliers,
 }
 
@@ -45,7 +44,7 @@ pub(crate) fn check(model: &AugmentedModel<'_>) -> Checked {
     let NoiseTests { mut checks, mut correlation, mut outliers } = noise_tests(fit);
     // What simulated runs say makes no test stricter: where none could fail, they are not asked.
     let matters = checks.iter().any(|test| test.p_value < RESIDUALS.resimulated_level)
-        || correlation.1.abs() >= SEARCH.autocorrelation_sigmas;
+        || correlation.sigmas.abs() >= SEARCH.autocorrelation_sigmas;
     if let Some(null) = null.as_ref().filter(|_| matters) {
         let simulated = null.resimulated(|fit| {
             let tests = noise_tests(fit);
@@ -66,7 +65,7 @@ pub(crate) fn check(model: &AugmentedModel<'_>) -> Checked {
     judge(&mut checks);
     let is_displaced = fit.records.segments.iter().all(Segment::is_displacement);
     let fails_to_be_white = checks.iter().any(|test| test.check.is_of_whiteness() && !test.passes);
-    let autocorrelated = is_displaced && fails_to_be_white && correlation.1.abs() > WHITENESS_Z;
+    let autocorrelated = is_displaced && fails_to_be_white && correlation.sigmas.abs() > WHITENESS_Z;
     Checked { autocorrelated, checks, correlation, outliers }
 }
 
@@ -79,8 +78,7 @@ fn judge(checks: &mut [TestResult]) {
 /// The tests of the innovations alone, by formula.
 struct NoiseTests {
     checks: Vec<TestResult>,
-    /// As in [`Checked`].
-    correlation: (f64, f64),
+    correlation: Correlation,
     outliers: Outliers,
 }
 
@@ -105,14 +103,14 @@ fn innovations<'f>(fit: &'f ModelFit<'_>, component: usize) -> Vec<&'f Innovatio
 
 /// Whether a measurement's error is of the fitted noise: what nobody recorded of the motion within rows has a
 /// size that is known roughly, and tails of its own.
-fn is_tested_by_size(fit: &ModelFit<'_>, (segment, measurement): (usize, usize)) -> bool {
+fn is_tested_by_size(fit: &ModelFit<'_>, segment: usize, measurement: usize) -> bool {
     fit.within_row_share(segment, measurement) <= RESIDUALS.max_within_row_share
 }
 
 /// The innovations whose size and tails are tested.
 fn tested<'f>(fit: &'f ModelFit<'_>, component: usize) -> Vec<&'f InnovationComponent> {
     let mut tested = innovations(fit, component);
-    tested.retain(|innovation| is_tested_by_size(fit, (innovation.segment, innovation.measurement)));
+    tested.retain(|innovation| is_tested_by_size(fit, innovation.segment, innovation.measurement));
     tested
 }
 
@@ -148,9 +146,9 @@ fn size(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) {
 }
 
 /// Ljung–Box test over the measurements of each segment and the displacements of each run. Returns the most
-/// significant correlation: coefficient at lag one, and standard errors.
-fn whiteness(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) -> (f64, f64) {
-    let mut strongest = (0.0, 0.0_f64);
+/// significant correlation.
+fn whiteness(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) -> Correlation {
+    let mut strongest = Correlation::default();
     for (component, name) in Component::ALL.into_iter().enumerate() {
         let series = innovations(fit, component);
         let n = series.len() as f64;
@@ -182,9 +180,9 @@ fn whiteness(fit: &ModelFit<'_>, add: &mut impl FnMut(Check, f64, f64)) -> (f64,
             lags += 1.0;
         }
         if lags > 0.0 {
-            let z = weighted_products / variance / squared_weights.sqrt();
-            if z.abs() > f64::abs(strongest.1) {
-                strongest = (coefficient, z);
+            let sigmas = weighted_products / variance / squared_weights.sqrt();
+            if sigmas.abs() > strongest.sigmas.abs() {
+                strongest = Correlation { coefficient, sigmas };
             }
             add(Check::Whiteness(name), statistic, p_of_chi_square(statistic, lags));
         }
@@ -228,7 +226,8 @@ fn anscombe_glynn(kurtosis: f64, n: f64) -> f64 {
 fn outliers(fit: &ModelFit<'_>) -> Outliers {
     let mut found = Outliers { measurements: tested(fit, 0).len(), ..Outliers::default() };
     let rejected = fit.solution.pass.outliers.iter().copied();
-    let rejected: Vec<_> = rejected.filter(|of| is_tested_by_size(fit, *of)).collect();
+    let rejected: Vec<_> =
+        rejected.filter(|(segment, measurement)| is_tested_by_size(fit, *segment, *measurement)).collect();
     let phase = fit.solution.pass.innovations.first().map_or(&[][..], Vec::as_slice);
     let mut cancelled_by = None;
     for (position, &(segment, measurement)) in rejected.iter().enumerate() {
@@ -281,7 +280,7 @@ pub(crate) fn residual_persistence(model: &AugmentedModel<'_>, component: usize)
     let series = innovations(fit, component);
     let large = |pair: &&[&InnovationComponent]| {
         pair[0].z.abs() > RESIDUALS.tail_innovation_sigmas
-            && is_tested_by_size(fit, (pair[0].segment, pair[0].measurement))
+            && is_tested_by_size(fit, pair[0].segment, pair[0].measurement)
     };
     let follows = |is_next: &dyn Fn(usize, usize) -> bool| {
         let pairs = series.windows(2).filter(large).filter(|pair| is_next(pair[0].segment, pair[1].segment));
@@ -411,8 +410,8 @@ mod tests {
     fn displacements_that_err_alike_are_not_white_and_the_instrument_is_named() {
         let is_white = |dataset: &Dataset| {
             let mut least = 1.0_f64;
-            let (coefficient, _) = whiteness(&fitted(dataset), &mut |_, _, p_value| least = least.min(p_value));
-            (least > 1e-3, coefficient)
+            let correlation = whiteness(&fitted(dataset), &mut |_, _, p_value| least = least.min(p_value));
+            (least > 1e-3, correlation.coefficient)
         };
         let (white, alike) = (lasting(0.0), lasting(0.7));
         // 234 pairs show a correlation to 0.07.

@@ -245,7 +245,7 @@ pub(crate) fn or_of_other_form(finding: &mut Finding, deviation: FormDeviation, 
 
 /// Doubts effects that no other doubt is on, where the score of an uncatalogued term is significant beside
 /// them by more than the error of their form.
-pub(crate) fn or_incomplete(findings: &mut [Finding], (score, p_value): (f64, f64)) {
+pub(crate) fn or_incomplete(findings: &mut [Finding], score: f64, p_value: f64) {
     if p_value >= FINDINGS.lack_of_fit_level {
         return;
     }

@@ -52,7 +52,7 @@ pub(crate) fn lack_of_fit(base: &ModelFit<'_>, model: &AugmentedModel<'_>, effec
     let mut scored = scan(&model.fit, &model.candidates, &candidates);
     let of_forms = scored.split_off(products);
     let first = |scored| {
-        let (scored, p_value) = best_first(model, scored, (FINDINGS.lack_of_fit_level, FINDINGS.lack_of_fit_level))?;
+        let (scored, p_value) = best_first(model, scored, FINDINGS.lack_of_fit_level, FINDINGS.lack_of_fit_level)?;
         Some((scored.into_iter().next()?, p_value))
     };
     let of_form = |((index, test), scored): (&(usize, Test), &[Scored])| {

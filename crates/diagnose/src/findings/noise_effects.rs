@@ -14,7 +14,7 @@ use rules::Rule;
 
 use crate::candidates::candidate::terms;
 use crate::candidates::cause::{Basis, Cause, Doubt};
-use crate::checks::check::{Check, Component, ResidualPersistence, TestResult};
+use crate::checks::check::{Check, Component, Correlation, ResidualPersistence, TestResult};
 use crate::checks::errors_at_rest::{ErrorsAtRest, errors_at_rest};
 use crate::checks::outlier_attribution::{ErrorSource, log_likelihoods};
 use crate::checks::residual_tests::residual_persistence;
@@ -41,7 +41,7 @@ struct LastingErrors {
 impl LastingErrors {
     /// An instrument errs while the robot stands, too, unless its errors go with the place.
     fn of(structure: &MeanStructure<'_>, recorded: &[Dataset]) -> Option<Self> {
-        let (coefficient, sigmas) = structure.correlated.filter(|(coefficient, _)| *coefficient > 0.0)?;
+        let Correlation { coefficient, sigmas } = structure.correlated.filter(|of| of.coefficient > 0.0)?;
         let at_rest =
             Rule::ErrorsAtRest.changes(ErrorsAtRest::Autocorrelated, |_| errors_at_rest(recorded, coefficient));
         Some(Self { coefficient, sigmas, at_rest })

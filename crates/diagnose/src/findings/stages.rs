@@ -266,9 +266,9 @@ fn doubt_incomplete_models(results: &StageResults<'_, '_>, mut findings: Vec<Fin
             });
         }
     }
-    if let Some(product) = left.of_products {
+    if let Some((score, p_value)) = left.of_products {
         findings = Rule::Incomplete.changes(findings, |mut findings| {
-            finding::or_incomplete(&mut findings, product);
+            finding::or_incomplete(&mut findings, score, p_value);
             findings
         });
     }

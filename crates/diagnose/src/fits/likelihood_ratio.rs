@@ -21,7 +21,8 @@ pub(crate) fn significant_once_refitted<'e, 'a>(
     known: &mut FitCache<'a>,
     model: &AugmentedModel<'a>,
     entries: &'e [Entry],
-    (tests, level): (f64, f64),
+    tests: f64,
+    level: f64,
 ) -> Option<&'e Entry> {
     let mut ranked: Vec<&Entry> = entries.iter().filter(|entry| entry.p_value <= SEARCH.refitted_level).collect();
     ranked.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
@@ -80,15 +81,15 @@ mod tests {
         let (score, tests) = (entries[0].p_value, tests_in(&entries));
         // A level that the score misses by a factor of a hundred.
         let level = 0.01 * score * tests;
-        let found = significant_once_refitted(&mut known, &model, &entries, (tests, level));
+        let found = significant_once_refitted(&mut known, &model, &entries, tests, level);
         assert_eq!(found.map(|entry| entry.scored.candidate.id()), Some("slip_speed"));
         assert!(known.fit(&[effect("slip_speed")]).is_some(), "rivals take the refit from here");
         // Nothing is significant at any level: rejects a level that is not asked.
-        let none = significant_once_refitted(&mut known, &model, &entries, (tests, 1e-30));
+        let none = significant_once_refitted(&mut known, &model, &entries, tests, 1e-30);
         assert!(none.is_none());
         // Nor are entries refitted whose score says nothing at all.
         let mut dull = entries.clone();
         dull.iter_mut().for_each(|entry| entry.p_value = 0.02);
-        assert!(significant_once_refitted(&mut known, &model, &dull, (tests, 1.0)).is_none());
+        assert!(significant_once_refitted(&mut known, &model, &dull, tests, 1.0).is_none());
     }
 }

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use rules::Rule;
 
 use crate::candidates::candidate::{Candidate, terms};
+use crate::checks::check::Correlation;
 use crate::fits::augmented_model::AugmentedModel;
 use crate::fits::scan::{detectable_statistic, scan_parts_of};
 use crate::fits::statistics::{p_of_upper_student, z_of_upper};
@@ -90,17 +91,20 @@ pub(crate) fn among_simulated<'p>(p_value: f64, simulated: impl Iterator<Item = 
     judged(z_of_upper(p_value), &z).max(p_value)
 }
 
-/// A correlation, as coefficient and in standard errors, beyond what simulated runs have in its direction.
-pub(crate) fn beyond_simulated((coefficient, sigmas): (f64, f64), simulated: &[(f64, f64)]) -> (f64, f64) {
+/// A correlation beyond what simulated runs have in its direction.
+pub(crate) fn beyond_simulated(found: Correlation, simulated: &[Correlation]) -> Correlation {
     let count = simulated.len() as f64;
-    let mean = |of: fn(&(f64, f64)) -> f64| simulated.iter().map(of).sum::<f64>() / count;
-    let (coefficient_mean, sigmas_mean) = (mean(|of| of.0), mean(|of| of.1));
-    let variance = simulated.iter().map(|of| (of.1 - sigmas_mean).powi(2)).sum::<f64>() / (count - 1.0);
+    let mean = |of: fn(&Correlation) -> f64| simulated.iter().map(of).sum::<f64>() / count;
+    let (coefficient_mean, sigmas_mean) = (mean(|of| of.coefficient), mean(|of| of.sigmas));
+    let variance = simulated.iter().map(|of| (of.sigmas - sigmas_mean).powi(2)).sum::<f64>() / (count - 1.0);
     // What has the other sign explains nothing, and what is larger explains all.
     let left = |value: f64, mean: f64| {
         if value * mean > 0.0 { value.signum() * f64::max(value.abs() - mean.abs(), 0.0) } else { value }
     };
-    (left(coefficient, coefficient_mean), left(sigmas, sigmas_mean) / variance.sqrt().max(1.0))
+    Correlation {
+        coefficient: left(found.coefficient, coefficient_mean),
+        sigmas: left(found.sigmas, sigmas_mean) / variance.sqrt().max(1.0),
+    }
 }
 
 /// Upper tail of a value among simulated ones, which are normal with unknown mean and variance: not below 0
@@ -143,17 +147,19 @@ mod tests {
     fn a_correlation_is_judged_beyond_what_simulated_runs_have() {
         // Means 0.2 and 4, standard deviation 2: 0.5 − 0.2 and (10 − 4)/2. Rejects quotients by the sum, by
         // the count of values or by the variance.
-        let simulated = [(0.1, 2.0), (0.2, 4.0), (0.3, 6.0)];
-        let (coefficient, sigmas) = beyond_simulated((0.5, 10.0), &simulated);
+        let of = |(coefficient, sigmas): (f64, f64)| Correlation { coefficient, sigmas };
+        let simulated = [(0.1, 2.0), (0.2, 4.0), (0.3, 6.0)].map(of);
+        let Correlation { coefficient, sigmas } = beyond_simulated(of((0.5, 10.0)), &simulated);
         assert!((coefficient - 0.3).abs() < 1e-12 && (sigmas - 3.0).abs() < 1e-12, "{coefficient} {sigmas}");
         // What is no more than that is nothing, and what has the other sign stays.
-        assert_eq!(beyond_simulated((0.1, 3.0), &simulated), (0.0, 0.0));
-        assert_eq!(beyond_simulated((-0.5, -10.0), &simulated), (-0.5, -5.0));
+        assert_eq!(beyond_simulated(of((0.1, 3.0)), &simulated), of((0.0, 0.0)));
+        assert_eq!(beyond_simulated(of((-0.5, -10.0)), &simulated), of((-0.5, -5.0)));
         // Rejects means that are taken off by their sign alone: both are negative here.
-        let (coefficient, sigmas) = beyond_simulated((-0.5, -10.0), &simulated.map(|(a, b)| (-a, -b)));
+        let negative = simulated.map(|a| of((-a.coefficient, -a.sigmas)));
+        let Correlation { coefficient, sigmas } = beyond_simulated(of((-0.5, -10.0)), &negative);
         assert!((coefficient + 0.3).abs() < 1e-12 && (sigmas + 3.0).abs() < 1e-12, "{coefficient} {sigmas}");
         // Standard errors are not below 1, by formula.
-        let (_, sigmas) = beyond_simulated((0.5, 10.0), &[(0.0, 3.9), (0.0, 4.0), (0.0, 4.1)]);
+        let sigmas = beyond_simulated(of((0.5, 10.0)), &[(0.0, 3.9), (0.0, 4.0), (0.0, 4.1)].map(of)).sigmas;
         assert!((sigmas - 6.0).abs() < 1e-12, "{sigmas}");
     }
 

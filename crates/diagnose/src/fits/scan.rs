@@ -172,7 +172,7 @@ fn passes<'p, 'c>(parts: &'p [&'c [Candidate]]) -> Vec<&'p [&'c [Candidate]]> {
 pub(crate) fn scan(fit: &ModelFit<'_>, chosen: &[Candidate], candidates: &[Candidate]) -> Vec<Scored> {
     let each: Vec<&[Candidate]> = candidates.chunks(1).collect();
     scan_parts_of(fit, chosen, &each, |own, projected, equations| {
-        score_test(&own[0], own[0].parameters(), projected, (equations.count, freedom(fit, equations)))
+        score_test(&own[0], own[0].parameters(), projected, equations.count, freedom(fit, equations))
     })
 }
 
@@ -182,7 +182,8 @@ fn score_test(
     candidate: &Candidate,
     parameters: Vec<TermParameter>,
     Projected { information, gradient, share }: &Projected,
-    (count, freedom): (f64, f64),
+    count: f64,
+    freedom: f64,
 ) -> Scored {
     // Noise is estimated by likelihood, without its degrees of freedom.
     let shrink = freedom / count.max(1.0);
@@ -229,15 +230,15 @@ mod tests {
         }
     }
 
-    fn tested(prior_sigma: [f64; 2], of: (f64, f64)) -> Scored {
+    fn tested(prior_sigma: [f64; 2], count: f64, freedom: f64) -> Scored {
         let candidate = Candidate::Effect { id: "slip_speed", variant: 0, at: None };
         let parameters = prior_sigma.map(|prior_sigma| TermParameter { prior_sigma, ..UNIT }).to_vec();
-        score_test(&candidate, parameters, &projected(), of)
+        score_test(&candidate, parameters, &projected(), count, freedom)
     }
 
     #[test]
     fn the_score_test_of_two_parameters_is_that_on_paper() {
-        let scored = tested([1.0, 1.0], (1e9, 1e9));
+        let scored = tested([1.0, 1.0], 1e9, 1e9);
         assert_eq!(scored.dimensions, 2);
         // Rejects (Σg)²/ΣI = 36/11, and a sum of gᵢ²/Iᵢᵢ = 1 + 16/3. Rounding and the ridge change it by
         // 1e-11 at most.
@@ -256,17 +257,17 @@ mod tests {
     fn directions_that_a_plausible_effect_does_not_show_are_not_tested() {
         // A prior sigma of 0.1 on the second: [[4, 0.2], [0.2, 0.03]], eigenvalues 4.0100 and 0.0199.
         // Rejects a threshold in the parameters' own units, which keeps both.
-        let scored = tested([1.0, 0.1], (1e9, 1e9));
+        let scored = tested([1.0, 0.1], 1e9, 1e9);
         assert_eq!(scored.dimensions, 1);
         // The estimates are those of both parameters still.
         assert!((scored.estimates[1].0 - 1.5).abs() < 1e-11);
-        assert_eq!(tested([0.1, 0.1], (1e9, 1e9)).dimensions, 0);
+        assert_eq!(tested([0.1, 0.1], 1e9, 1e9).dimensions, 0);
     }
 
     #[test]
     fn few_degrees_of_freedom_shrink_the_statistic() {
         // 20 observations, 5 free columns: 15/20 of 5.5. Rejects a variance over the count, which leaves 5.5.
-        let scored = tested([1.0, 1.0], (20.0, 15.0));
+        let scored = tested([1.0, 1.0], 20.0, 15.0);
         assert!((scored.statistic - 4.125).abs() < 1e-11, "{}", scored.statistic);
     }
 

@@ -27,8 +27,8 @@ pub(crate) fn wald_test(extended: &AugmentedModel<'_>, candidate: usize) -> Opti
     let own = extended.columns(candidate);
     let projected = extended.fit.eliminated(&equations, &own)?.of_columns(&equations, &own);
     let parameters = extended.candidates[candidate].parameters();
-    let of = (equations.count, freedom(&extended.fit, &equations));
-    Some(wald_test_of(&projected.information, &extended.estimates(candidate), &parameters, of))
+    let freedom = freedom(&extended.fit, &equations);
+    Some(wald_test_of(&projected.information, &extended.estimates(candidate), &parameters, equations.count, freedom))
 }
 
 /// The same of estimates with the information that the free columns leave; of `count` observations they
@@ -37,7 +37,8 @@ fn wald_test_of(
     information: &DMatrix<f64>,
     estimates: &DVector<f64>,
     parameters: &[TermParameter],
-    (count, freedom): (f64, f64),
+    count: f64,
+    freedom: f64,
 ) -> (Test, Vec<(f64, f64)>) {
     let gradient = information * estimates;
     let directions: Vec<(f64, f64)> = detectable_directions(information, &gradient, parameters)
@@ -152,15 +153,15 @@ mod tests {
     const UNIT: TermParameter = TermParameter { name: "a", unit: "1", prior_sigma: 1.0 };
 
     /// I = [[4, 2], [2, 3]], θ = (−1/4, 3/2): Iθ = (2, 4), θᵀIθ = 11/2, I⁻¹ = [[3, −2], [−2, 4]]/8.
-    fn tested(prior_sigma: [f64; 2], of: (f64, f64)) -> (Test, Vec<(f64, f64)>) {
+    fn tested(prior_sigma: [f64; 2], count: f64, freedom: f64) -> (Test, Vec<(f64, f64)>) {
         let information = DMatrix::from_row_slice(2, 2, &[4.0, 2.0, 2.0, 3.0]);
         let parameters = prior_sigma.map(|prior_sigma| TermParameter { prior_sigma, ..UNIT });
-        wald_test_of(&information, &DVector::from_column_slice(&[-0.25, 1.5]), &parameters, of)
+        wald_test_of(&information, &DVector::from_column_slice(&[-0.25, 1.5]), &parameters, count, freedom)
     }
 
     #[test]
     fn the_wald_test_of_two_parameters_is_that_on_paper() {
-        let (test, directions) = tested([1.0, 1.0], (1e9, 1e9));
+        let (test, directions) = tested([1.0, 1.0], 1e9, 1e9);
         // Rejects a sum of θᵢ²Iᵢᵢ = 1/4 + 27/4. The ridge and rounding change each number by 1e-11 at most.
         assert!((test.statistic - 5.5).abs() < 1e-11, "{test:?}");
         assert!((test.estimates[0].1 - 0.375_f64.sqrt()).abs() < 1e-11, "{test:?}");
@@ -177,11 +178,11 @@ mod tests {
     fn sizes_of_few_observations_are_known_less_well() {
         // 8 observations, 6 free: the variance is 8/2 times as large. Rejects shrink in place of its
         // reciprocal.
-        let (test, _) = tested([1.0, 1.0], (8.0, 2.0));
+        let (test, _) = tested([1.0, 1.0], 8.0, 2.0);
         assert!((test.estimates[1].1 - (0.5_f64 * 4.0).sqrt()).abs() < 1e-11, "{test:?}");
         assert!((test.statistic - 5.5 / 4.0).abs() < 1e-11, "{test:?}");
         // Scaled by prior sigmas of 0.1, no direction has an eigenvalue of 1: nothing is tested.
-        let (test, directions) = tested([0.1, 0.1], (1e9, 1e9));
+        let (test, directions) = tested([0.1, 0.1], 1e9, 1e9);
         assert!(directions.is_empty() && test.statistic == 0.0 && test.p_value == 1.0, "{test:?}");
     }
 

@@ -55,7 +55,7 @@ pub(crate) fn clock_offsets(datasets: &[Dataset], clocks: &[RunClock], min_commo
     let few = (all.len() / RECORDS.min_runs_per_odd_clock).max(1);
     let odd = if odd.len() <= few { odd } else { Vec::new() };
     let own = |of: &&OfRun<'_>| ClockOffset {
-        runs: Some(vec![run_name(datasets, of.run)]),
+        runs: Some(vec![run_name(datasets, of.run.0, of.run.1)]),
         offset_s: of.profile.offset_s,
         sigma_s: of.profile.sigma_s,
         gain: of.profile.gain_over(common_s),

@@ -9,7 +9,7 @@ pub(crate) fn session_names(datasets: &[Dataset]) -> Vec<String> {
 }
 
 /// What a run is called: with its session where there are several, as each may have a run of the same id.
-pub(crate) fn run_name(datasets: &[Dataset], (session, run): (usize, usize)) -> String {
+pub(crate) fn run_name(datasets: &[Dataset], session: usize, run: usize) -> String {
     let id = &datasets[session].runs[run].info.id;
     match datasets {
         [_] => id.clone(),
@@ -27,7 +27,7 @@ mod tests {
         monday.provenance.name = Some("monday".to_owned());
         tuesday.provenance.name = Some("tuesday".to_owned());
         let id = tuesday.runs[2].info.id.clone();
-        assert_eq!(run_name(&[monday, tuesday.clone()], (1, 2)), format!("tuesday/{id}"));
-        assert_eq!(run_name(&[tuesday], (0, 2)), id);
+        assert_eq!(run_name(&[monday, tuesday.clone()], 1, 2), format!("tuesday/{id}"));
+        assert_eq!(run_name(&[tuesday], 0, 2), id);
     }
 }

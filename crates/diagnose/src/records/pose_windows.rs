@@ -17,6 +17,13 @@ use crate::records::clock_profile::turns_at;
 use crate::records::log_rows::has_outlying_rows;
 use crate::settings::RECORDS;
 
+/// A window of a track, by the numbers of its first and its last pose.
+#[derive(Clone, Copy)]
+pub(crate) struct Window {
+    pub(crate) from: usize,
+    pub(crate) to: usize,
+}
+
 /// The measured poses of a run, and the travel of its wheels between them by nominal lengths.
 pub(crate) struct PoseTrack {
     pub(crate) run: (usize, usize),
@@ -86,9 +93,9 @@ impl PoseTrack {
         (of.t_s.len() >= RECORDS.min_window_poses).then_some(of)
     }
 
-    /// Are rows missing between two poses? What the wheels did meanwhile may be missing with them.
-    pub(crate) fn has_gap(&self, (from, to): (usize, usize)) -> bool {
-        let ((ended, _), (_, begun)) = (self.gaps[from], self.gaps[to]);
+    /// Are rows missing in a window? What the wheels did meanwhile may be missing with them.
+    pub(crate) fn has_gap(&self, window: Window) -> bool {
+        let ((ended, _), (_, begun)) = (self.gaps[window.from], self.gaps[window.to]);
         begun > ended
     }
 
@@ -97,15 +104,15 @@ impl PoseTrack {
         self.t_s.len()
     }
 
-    /// Travel of both wheels from one pose to another, metres.
-    fn travel_m(&self, (from, to): (usize, usize)) -> Wheels<f64> {
-        let steps = &self.steps_m[self.after[from]..self.after[to]];
+    /// Travel of both wheels over a window, metres.
+    fn travel_m(&self, window: Window) -> Wheels<f64> {
+        let steps = &self.steps_m[self.after[window.from]..self.after[window.to]];
         steps.iter().fold(Wheels::both(0.0), |sum, step| sum.zip_with(*step, |a, b| a + b))
     }
 
-    /// Motion from one pose to another by the instrument, seen from the first.
-    fn motion(&self, (from, to): (usize, usize)) -> Pose {
-        self.measured[from].to(self.measured[to])
+    /// Motion over a window by the instrument, seen from its first pose.
+    fn motion(&self, window: Window) -> Pose {
+        self.measured[window.from].to(self.measured[window.to])
     }
 
     /// Poses by dead reckoning of a drive, from the first one.
@@ -148,7 +155,7 @@ impl<'t> CalibratedTracks<'t> {
     /// `None` where the windows do not determine the wheels.
     pub(crate) fn of(tracks: &'t [PoseTrack], separation_m: f64) -> Option<Self> {
         let span = span(tracks, separation_m)?;
-        let of_all: Vec<(&PoseTrack, (usize, usize))> =
+        let of_all: Vec<(&PoseTrack, Window)> =
             tracks.iter().flat_map(|track| windows(track.len(), span).map(move |window| (track, window))).collect();
         // Turns.
         let rows: Vec<(Vector2<f64>, f64)> = of_all
@@ -197,14 +204,14 @@ impl<'t> CalibratedTracks<'t> {
     }
 
     /// What the wheels leave of the motion over a window of a track.
-    pub(crate) fn residual(&self, track: usize, window: (usize, usize)) -> Residual {
+    pub(crate) fn residual(&self, track: usize, window: Window) -> Residual {
         self.residual_of(self.body_from_sensor, track, window)
     }
 
     /// The same where the instrument is elsewhere on the robot.
-    pub(crate) fn residual_of(&self, sensor: Pose, track: usize, (from, to): (usize, usize)) -> Residual {
+    pub(crate) fn residual_of(&self, sensor: Pose, track: usize, window: Window) -> Residual {
         let poses = &self.dead_reckoned[track];
-        let (dead_reckoned, measured) = (poses[from].to(poses[to]), self.tracks[track].motion((from, to)));
+        let (dead_reckoned, measured) = (poses[window.from].to(poses[window.to]), self.tracks[track].motion(window));
         let predicted = sensor.inverse() * dead_reckoned * sensor;
         let (sin, cos) = sensor.theta_rad.sin_cos();
         let (x_m, y_m) = (measured.x_m - predicted.x_m, measured.y_m - predicted.y_m);
@@ -214,11 +221,7 @@ impl<'t> CalibratedTracks<'t> {
     /// The instrument's place on the robot in a track, with standard deviations (x, y, heading), by the
     /// windows that are taken. The wheels' scale is that of all tracks: on a circle a scale and a lever arm
     /// are one.
-    pub(crate) fn extrinsics(
-        &self,
-        track: usize,
-        is_taken: impl Fn((usize, usize)) -> bool,
-    ) -> Option<(Pose, [f64; 3])> {
+    pub(crate) fn extrinsics(&self, track: usize, is_taken: impl Fn(Window) -> bool) -> Option<(Pose, [f64; 3])> {
         let taken = windows(self.tracks[track].len(), self.span).filter(|window| is_taken(*window));
         let rows: Vec<ExtrinsicsRow> =
             extrinsics_rows(&self.tracks[track], &self.dead_reckoned[track], taken).collect();
@@ -230,8 +233,8 @@ impl<'t> CalibratedTracks<'t> {
 }
 
 /// Windows of a span, one after the other.
-fn windows(poses: usize, span: usize) -> impl Iterator<Item = (usize, usize)> {
-    (0..poses).step_by(span).map(move |from| (from, from + span)).take_while(move |(_, to)| *to < poses)
+fn windows(poses: usize, span: usize) -> impl Iterator<Item = Window> {
+    (0..poses).step_by(span).map(move |from| Window { from, to: from + span }).take_while(move |of| of.to < poses)
 }
 
 /// The shortest span whose windows reach so far that wheels show in them, by their median.
@@ -271,10 +274,10 @@ impl ExtrinsicsRow {
 fn extrinsics_rows<'t>(
     track: &'t PoseTrack,
     poses: &'t [Pose],
-    windows: impl Iterator<Item = (usize, usize)> + 't,
+    windows: impl Iterator<Item = Window> + 't,
 ) -> impl Iterator<Item = ExtrinsicsRow> + 't {
-    windows.map(|(from, to)| {
-        let (measured, dead_reckoned) = (track.motion((from, to)), poses[from].to(poses[to]));
+    windows.map(|window| {
+        let (measured, dead_reckoned) = (track.motion(window), poses[window.from].to(poses[window.to]));
         ExtrinsicsRow {
             measured: Vector2::new(measured.x_m, measured.y_m),
             dead_reckoned: Vector2::new(dead_reckoned.x_m, dead_reckoned.y_m),
@@ -392,13 +395,14 @@ mod tests {
         assert_eq!(track.len(), 14);
         // A step each to the five rows between poses, and one to the pose; none before the first pose.
         assert_eq!(track.after[..5], [1, 7, 13, 19, 25]);
-        let travel_m = track.travel_m((1, 4));
+        let travel_m = track.travel_m(Window { from: 1, to: 4 });
         assert!((travel_m.left - 0.08 * 1.5).abs() < 1e-12 && (travel_m.right - 0.08 * 1.5).abs() < 1e-12);
         assert!(track.steps_m.iter().all(|step| step.left >= 0.0), "no row is driven twice");
+        let has_gap = |from: usize, to: usize| track.has_gap(Window { from, to });
         // Poses at 2.52, 3.02, 3.52 and 4.02 s are numbers 4 to 7, and the gap is from 2.9 to 4.0 s. Rejects
         // gaps that count before a pose alone: of two poses within a gap, none is between them then.
-        let with_gap: Vec<usize> = (0..13).filter(|&from| track.has_gap((from, from + 1))).collect();
+        let with_gap: Vec<usize> = (0..13).filter(|&from| has_gap(from, from + 1)).collect();
         assert_eq!(with_gap, [4, 5, 6]);
-        assert!(track.has_gap((3, 8)) && !track.has_gap((1, 4)) && !track.has_gap((7, 12)));
+        assert!(has_gap(3, 8) && !has_gap(1, 4) && !has_gap(7, 12));
     }
 }

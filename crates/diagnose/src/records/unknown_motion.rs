@@ -90,11 +90,12 @@ pub(crate) fn unknown_motions(
     for (track, Event { poses, kind, displacement, sigmas }) in events {
         let track = &tracks[track];
         let [from_s, to_s] = [poses.start, poses.end - 1].map(|pose| track.t_s[pose]);
-        records[track.run.0].runs[track.run.1].add_unknown_motion([UnknownMotion { from_s, to_s }]);
+        let (session, run) = track.run;
+        records[session].runs[run].add_unknown_motion([UnknownMotion { from_s, to_s }]);
         let displacement = Pose::new(displacement.x, displacement.y, displacement.z);
         anomalies.push(Anomaly {
             kind,
-            run: run_name(datasets, track.run),
+            run: run_name(datasets, session, run),
             span_s: [from_s, to_s],
             displacement,
             sigmas,
@@ -104,8 +105,9 @@ pub(crate) fn unknown_motions(
     for (track, OtherExtrinsics { kind, displacement, sigmas }) in otherwise {
         let track = &tracks[track];
         left_out.push(track.run);
+        let run = run_name(datasets, track.run.0, track.run.1);
         let span_s = [track.t_s[0], track.t_s[track.len() - 1]];
-        anomalies.push(Anomaly { kind, run: run_name(datasets, track.run), span_s, displacement, sigmas });
+        anomalies.push(Anomaly { kind, run, span_s, displacement, sigmas });
     }
     left_out.sort_unstable();
     for (session, run) in left_out.into_iter().rev() {
@@ -120,6 +122,7 @@ mod tests {
     use kinematics::{Increment, Wheels};
 
     use super::*;
+    use crate::records::pose_windows::Window;
     use crate::small_robot::{assert_unmoved, dataset_of};
 
     const SEPARATION_M: f64 = 0.36;
@@ -297,15 +300,16 @@ mod tests {
             "{at:?}"
         );
         text += &format!("at: {at:?}, span {}\n", calibrated.span);
-        for window in [(0, 1), (3, 11), (50, 82)] {
-            text += &format!("{window:?}: {:?}\n", [0, 3].map(|track| calibrated.residual(track, window)));
+        for (from, to) in [(0, 1), (3, 11), (50, 82)] {
+            let residuals = [0, 3].map(|track| calibrated.residual(track, Window { from, to }));
+            text += &format!("{:?}: {residuals:?}\n", (from, to));
         }
         for track in [0, 3] {
             let all = calibrated.extrinsics(track, |_| true);
-            text += &format!("{all:?} {:?}\n", calibrated.extrinsics(track, |(from, _)| from < 100));
+            text += &format!("{all:?} {:?}\n", calibrated.extrinsics(track, |window| window.from < 100));
             text += &format!("{:?}\n", &calibrated.poses(track)[190..192]);
         }
-        assert!(calibrated.extrinsics(0, |(from, _)| from < 4).is_none(), "too few windows");
+        assert!(calibrated.extrinsics(0, |window| window.from < 4).is_none(), "too few windows");
         assert_unmoved("windows.txt", &text);
     }
 

@@ -9,7 +9,7 @@ use estimation::{FitSettings, ModelFit};
 use rules::Rule;
 
 use crate::candidates::candidate::{Candidate, terms};
-use crate::checks::check::{Check, TestResult};
+use crate::checks::check::{Check, Correlation, TestResult};
 use crate::checks::residual_tests::{Checked, check};
 use crate::findings::finding;
 use crate::fits::augmented_model::AugmentedModel;
@@ -24,7 +24,7 @@ use crate::settings::{LEVELS, SEARCH};
 pub(crate) const THINNED: FitSettings = FitSettings { nuisances: false, thin: true, thin_displacements: true };
 
 fn is_white(checked: &Checked) -> bool {
-    let (coefficient, sigmas) = checked.correlation;
+    let Correlation { coefficient, sigmas } = checked.correlation;
     coefficient.abs() < SEARCH.min_autocorrelation
         || (sigmas.abs() < SEARCH.autocorrelation_sigmas && !checked.autocorrelated)
 }
@@ -36,8 +36,8 @@ pub(crate) struct MeanStructure<'a> {
     pub(crate) found: SearchResult<'a>,
     pub(crate) checked: Checked,
     pub(crate) unlisted: Option<UncataloguedTerms<'a>>,
-    /// Correlation of successive measurements, where they were thinned: coefficient, and standard errors.
-    pub(crate) correlated: Option<(f64, f64)>,
+    /// Correlation of successive measurements, where they were thinned.
+    pub(crate) correlated: Option<Correlation>,
     /// A sparse term made measurements certainly likelier though odometry drifts more with it: another
     /// cause is present.
     pub(crate) spurious: bool,
@@ -125,8 +125,7 @@ pub(crate) fn mean_structure<'a>(
 /// Residuals that are autocorrelated with the effects found among all measurements.
 #[derive(Clone, Copy)]
 struct Autocorrelation {
-    /// Coefficient, and standard errors.
-    correlation: (f64, f64),
+    correlation: Correlation,
     /// As in [`MeanStructure`].
     spurious: bool,
     /// No sparse terms explain it.

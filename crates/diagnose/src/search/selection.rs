@@ -58,7 +58,7 @@ fn grown<'a>(
     let (tests, index) = (tests_in(&entries), model.candidates.len());
     for _ in 0..SEARCH.max_candidates_tried {
         let best = most_significant(&entries, tests, level).or_else(|| {
-            Rule::SignificantOnceRefitted.finds(significant_once_refitted(known, model, &entries, (tests, level)))
+            Rule::SignificantOnceRefitted.finds(significant_once_refitted(known, model, &entries, tests, level))
         })?;
         let (id, statistic) = (best.scored.candidate.id(), best.scored.statistic);
         let found = rivals(known, model, index, &entries, statistic, refusals);

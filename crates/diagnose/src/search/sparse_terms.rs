@@ -178,7 +178,7 @@ impl<'m, 'a> SparseSearch<'m, 'a> {
     pub(crate) fn beside(level: f64, base: &ModelFit<'a>, model: &'m AugmentedModel<'a>) -> Option<Self> {
         // No finding is asked for at a higher level.
         let scored = scan(&model.fit, &model.candidates, &library(base));
-        let (scored, p_value) = best_first(model, scored, (level, LEVELS.sparse_term_level))?;
+        let (scored, p_value) = best_first(model, scored, level, LEVELS.sparse_term_level)?;
         let trials = scored.len();
         if p_value > level {
             return None;
@@ -245,7 +245,8 @@ impl<'m, 'a> SparseSearch<'m, 'a> {
 pub(crate) fn best_first(
     model: &AugmentedModel<'_>,
     mut scored: Vec<Scored>,
-    (asked, deflated): (f64, f64),
+    asked: f64,
+    deflated: f64,
 ) -> Option<(Vec<Scored>, f64)> {
     scored.retain(|scored| scored.dimensions > 0);
     scored.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));

@@ -137,18 +137,13 @@ pub(crate) fn add_row(information: &mut Information, gradient: [f64; 3], sigma: 
 
 /// How far the wheels' contacts go between two rows by the nominal robot, metres, and how far it turns by
 /// them, radians.
-pub(crate) fn travel(
-    run: &RunLog,
-    (from, to): (usize, usize),
-    m_per_rad: Wheels<f64>,
-    separation_m: f64,
-) -> (Wheels<f64>, f64) {
+pub(crate) fn travel(run: &RunLog, session: &SessionCheck, from: usize, to: usize) -> (Wheels<f64>, f64) {
     let turned = Wheels {
         left: run.wheels.left[to] - run.wheels.left[from],
         right: run.wheels.right[to] - run.wheels.right[from],
     };
-    let travel_m = turned.zip_with(m_per_rad, |rad, m| rad * m);
-    (travel_m, (travel_m.right - travel_m.left) / separation_m)
+    let travel_m = turned.zip_with(session.m_per_rad(), |rad, m| rad * m);
+    (travel_m, (travel_m.right - travel_m.left) / session.robot.wheel_separation_m)
 }
 
 /// Gradients of a length and of a turn by the logarithms of the parameters.
@@ -195,15 +190,13 @@ fn add(information: &mut Information, session: &SessionCheck) {
 /// What tapes, walls, returns and a gyroscope tell of a run. A gyroscope of unknown scale tells the ratio
 /// of the wheels where the robot hardly turns, and nothing of how far it turns else.
 fn add_partial(run: &RunLog, session: &SessionCheck, row: &mut impl FnMut([f64; 3], f64)) {
-    let (m_per_rad, separation_m) = (session.m_per_rad(), session.robot.wheel_separation_m);
     // Where it hardly turns the yaw of a lidar is not known, nor how obliquely it drives at a wall.
-    let shows_wall_lengths =
-        !session.has_lidar || heading_range_rad(run, m_per_rad, separation_m) >= MIN_LIDAR_TURN_RAD;
+    let shows_wall_lengths = !session.has_lidar || heading_range_rad(run, session) >= MIN_LIDAR_TURN_RAD;
     let at = |t_s: f64| run.t_s.partition_point(|row_s| *row_s <= t_s).saturating_sub(1);
     for of in &run.partial {
         let (from, to) = (at(of.from_s), at(of.to_s));
-        let (travel_m, turn_rad) = travel(run, (from, to), m_per_rad, separation_m);
-        let [by_length, by_turn] = gradients(travel_m, turn_rad, separation_m);
+        let (travel_m, turn_rad) = travel(run, session, from, to);
+        let [by_length, by_turn] = gradients(travel_m, turn_rad, session.robot.wheel_separation_m);
         match (of.part, session.gyro_scale_sigma) {
             (Part::Length, _) => row(by_length, of.sigma),
             (Part::WallLength, _) if shows_wall_lengths => row(by_length, of.sigma),
@@ -217,8 +210,8 @@ fn add_partial(run: &RunLog, session: &SessionCheck, row: &mut impl FnMut([f64; 
 }
 
 /// Range of a run's headings by the nominal robot, radians.
-fn heading_range_rad(run: &RunLog, m_per_rad: Wheels<f64>, separation_m: f64) -> f64 {
-    let headings_rad = (0..run.wheels.left.len()).map(|row| travel(run, (0, row), m_per_rad, separation_m).1);
+fn heading_range_rad(run: &RunLog, session: &SessionCheck) -> f64 {
+    let headings_rad = (0..run.wheels.left.len()).map(|row| travel(run, session, 0, row).1);
     let (least, most) =
         headings_rad.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), rad| (least.min(rad), most.max(rad)));
     (most - least).max(0.0)

@@ -83,7 +83,7 @@ fn path_miss(run: &RunLog, hypothesis: Hypothesis, geometry: &DriveGeometry, shi
     let mut from_s = run.truth.first()?.t_s - shift_s;
     for sample in &run.truth {
         let to_s = sample.t_s - shift_s;
-        at = (run.angles_at(to_s)?, at.1 * driven(run, hypothesis, geometry, (from_s, to_s))?.0);
+        at = (run.angles_at(to_s)?, at.1 * driven(run, hypothesis, geometry, from_s, to_s)?.0);
         from_s = to_s;
         pairs.push(((at.1.x_m, at.1.y_m), (sample.x_m, sample.y_m)));
     }
@@ -154,7 +154,8 @@ fn driven(
     run: &RunLog,
     hypothesis: Hypothesis,
     geometry: &DriveGeometry,
-    (from_s, to_s): (f64, f64),
+    from_s: f64,
+    to_s: f64,
 ) -> Option<(Pose, f64, f64)> {
     let first = run.t_s.partition_point(|t_s| *t_s <= from_s);
     let last = run.t_s.partition_point(|t_s| *t_s < to_s);
@@ -182,7 +183,7 @@ fn goes_somewhere(step: &Step<'_>, geometry: &DriveGeometry) -> bool {
 
 /// What a hypothesis misses of a step, from 0 to about 2: of the distance driven, and of half a turn.
 fn miss(step: &Step<'_>, hypothesis: Hypothesis, geometry: &DriveGeometry) -> Option<f64> {
-    let (pose, driven_m, turned_rad) = driven(step.run, hypothesis, geometry, (step.from.0, step.to.0))?;
+    let (pose, driven_m, turned_rad) = driven(step.run, hypothesis, geometry, step.from.0, step.to.0)?;
     let (sin, cos) = step.from.1.theta_rad.sin_cos();
     let (dx_m, dy_m) = (step.to.1.x_m - step.from.1.x_m, step.to.1.y_m - step.from.1.y_m);
     let (ahead_m, aside_m) = (cos * dx_m + sin * dy_m, cos * dy_m - sin * dx_m);

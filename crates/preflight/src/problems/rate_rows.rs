@@ -26,7 +26,7 @@ pub(crate) fn found(check: &mut SessionCheck) {
     };
     let to_wheels = |[v, by]: [f64; 2]| [(v - by) / m_per_rad.left, (v + by) / m_per_rad.right];
     let same = |rates: [f64; 2]| rates;
-    restore(check, zeros_filled, (&same, &same), |rows, from, share, gain| {
+    restore(check, zeros_filled, &same, &same, |rows, from, share, gain| {
         let severity = if share > CHECKS.max_rounded_share { Severity::Error } else { Severity::Warning };
         // What a robot cannot do so often needs little of an instrument.
         let is_certain = gain > CHECKS.min_gain || (rows >= CHECKS.min_rows && gain > 0.0);
@@ -35,8 +35,8 @@ pub(crate) fn found(check: &mut SessionCheck) {
     let wraps = |rows: usize, from: Place, _: f64, gain: f64| {
         (gain > CHECKS.min_gain).then_some((RecordFault::RatesWrap { from, rows }, Severity::Error))
     };
-    if !restore(check, unwrapped, (&same, &same), wraps) {
-        restore(check, unwrapped, (&to_twist, &to_wheels), wraps);
+    if !restore(check, unwrapped, &same, &same, wraps) {
+        restore(check, unwrapped, &to_twist, &to_wheels, wraps);
     }
 }
 
@@ -49,7 +49,8 @@ type Change<'a> = &'a dyn Fn([f64; 2]) -> [f64; 2];
 fn restore(
     check: &mut SessionCheck,
     restored: fn(&mut [Columns]) -> Vec<(usize, usize)>,
-    (to, back): (Change<'_>, Change<'_>),
+    to: Change<'_>,
+    back: Change<'_>,
     say: impl Fn(usize, Place, f64, f64) -> Option<(RecordFault, Severity)>,
 ) -> bool {
     let mut columns: Vec<Columns> = check.runs.iter().map(|run| rates(run, to)).collect();

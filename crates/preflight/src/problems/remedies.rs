@@ -45,11 +45,10 @@ impl Remedy {
 
     /// Adds what it would tell of a session's drives.
     fn add(self, information: &mut Information, session: &SessionCheck) {
-        let (m_per_rad, separation_m) = (session.m_per_rad(), session.robot.wheel_separation_m);
         for run in &session.runs {
             let Some(last) = run.wheels.left.len().checked_sub(1) else { continue };
-            let (travel_m, turn_rad) = travel(run, (0, last), m_per_rad, separation_m);
-            let [by_length, by_turn] = gradients(travel_m, turn_rad, separation_m);
+            let (travel_m, turn_rad) = travel(run, session, 0, last);
+            let [by_length, by_turn] = gradients(travel_m, turn_rad, session.robot.wheel_separation_m);
             let is_straight = turn_rad.abs() < CHECKS.max_straight_turn_rad;
             let is_far = 0.5 * (travel_m.left + travel_m.right).abs() > CHECKS.min_taped_m;
             let mut length = |sigma_m: f64| {

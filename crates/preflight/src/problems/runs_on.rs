@@ -83,7 +83,7 @@ fn rates(pairs: &[Paired]) -> Option<Wheels<f64>> {
     let by = |outcome: &dyn Fn(&Paired) -> f64| -> Option<[f64; 3]> {
         let row = |pair: &Paired| -> Row {
             let regressors = [pair.moved.left / scale[0], pair.moved.right / scale[1], length_s(pair) / scale[2]];
-            (regressors, outcome(pair))
+            Row { regressors, outcome: outcome(pair) }
         };
         let found = robustly(&pairs.iter().map(row).collect::<Vec<_>>(), &none)?.by;
         Some([found[0] / scale[0], found[1] / scale[1], found[2] / scale[2]])

@@ -17,7 +17,7 @@ use crate::windows::{Measured, Reading};
 
 /// Names records that run on by themselves, and a part of the log whose wheels say something else; whether
 /// there is such a part.
-pub(crate) fn found(check: &mut SessionCheck, (reading, clock): (Reading, Clock)) -> bool {
+pub(crate) fn found(check: &mut SessionCheck, reading: Reading, clock: Clock) -> bool {
     let paired = |check: &SessionCheck| {
         let matched = check.matched_at(reading, clock).filter(|matched| matched.measured == Measured::Poses);
         matched.map(|matched| matched.pairs)

@@ -3,6 +3,7 @@
 use effects::Covariate;
 
 use super::*;
+use crate::checks::check::Correlation;
 use crate::checks::errors_at_rest::ErrorsAtRest;
 
 const SLIP: Cause = Cause::Effect("slip_speed");
@@ -151,7 +152,12 @@ fn checked(checks: &[(Check, f64, bool)]) -> Checked {
         passes: *passes,
     };
     let outliers = crate::checks::residual_tests::Outliers::default();
-    Checked { autocorrelated: false, checks: checks.iter().map(of).collect(), correlation: (0.0, 0.0), outliers }
+    Checked {
+        autocorrelated: false,
+        checks: checks.iter().map(of).collect(),
+        correlation: Correlation::default(),
+        outliers,
+    }
 }
 
 #[test]
@@ -214,7 +220,7 @@ fn mean_effects_alone_are_doubted_for_a_term_that_does_as_well() {
 fn what_is_left_beside_an_effect_doubts_it_by_the_bound_of_its_p_value() {
     let doubted = |score: f64, p_value: f64| {
         let mut findings = [found(10.0, &[SLIP]), found(10.0, &[SLIP, Cause::Unknown])];
-        or_incomplete(&mut findings, (score, p_value));
+        or_incomplete(&mut findings, score, p_value);
         assert_eq!(findings[1], found(10.0, &[SLIP, Cause::Unknown]));
         let [first, _] = findings;
         first.has_unlisted().then_some(first.probability)

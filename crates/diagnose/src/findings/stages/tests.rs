@@ -6,7 +6,7 @@ use effects::Covariate;
 
 use super::*;
 use crate::candidates::cause::Cause;
-use crate::checks::check::Check;
+use crate::checks::check::{Check, Correlation};
 use crate::checks::errors_at_rest::ErrorsAtRest;
 use crate::checks::residual_tests::{Checked, Outliers};
 use crate::findings::finding::of_causes;
@@ -26,7 +26,7 @@ fn structure<'a>(datasets: &'a [Dataset], checks: &[(Check, f64, bool)]) -> Mean
     };
     let checks = checks.iter().map(of).collect();
     let outliers = Outliers { p_value: 1.0, ..Outliers::default() };
-    let checked = Checked { autocorrelated: false, checks, correlation: (0.0, 0.0), outliers };
+    let checked = Checked { autocorrelated: false, checks, correlation: Correlation::default(), outliers };
     MeanStructure { base, found, checked, unlisted: None, correlated: None, spurious: false, competing: None }
 }
 

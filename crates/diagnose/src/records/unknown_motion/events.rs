@@ -5,7 +5,7 @@ use std::ops::Range;
 use dataset::quantile;
 use kinematics::{Pose, wrap_to_pi};
 
-use crate::records::pose_windows::{CalibratedTracks, Residual};
+use crate::records::pose_windows::{CalibratedTracks, Residual, Window};
 use crate::settings::RECORDS;
 
 /// What moved.
@@ -47,7 +47,7 @@ impl Limits {
             let mut all: [Vec<f64>; 3] = Default::default();
             for (track, of) in calibrated.tracks.iter().enumerate() {
                 for from in 0..of.len().saturating_sub(*span) {
-                    let residual = calibrated.residual(track, (from, from + span));
+                    let residual = calibrated.residual(track, Window { from, to: from + span });
                     all.iter_mut().zip(residual.iter()).for_each(|(all, residual)| all.push(residual.abs()));
                 }
             }
@@ -96,20 +96,20 @@ impl Limits {
         &'a self,
         calibrated: &'a CalibratedTracks<'_>,
         track: usize,
-        (from, to): (usize, usize),
+        window: Window,
         displacement: &'a Residual,
-    ) -> impl Iterator<Item = (usize, usize)> + 'a {
+    ) -> impl Iterator<Item = Window> + 'a {
         let of = &calibrated.tracks[track];
-        let longer = RECORDS.window_spans.into_iter().map(move |poses| (from.checked_sub(poses), to + poses));
-        let within = move |(before, after): &(usize, usize)| {
-            let around_s = (of.t_s[from] - of.t_s[*before]).max(of.t_s[*after] - of.t_s[to]);
-            let sigma = RECORDS.window_spans.iter().zip(&self.sigmas).find(|(span, _)| **span >= after - before);
+        let longer = move |poses| Some(Window { from: window.from.checked_sub(poses)?, to: window.to + poses });
+        let within = move |Window { from, to }: &Window| {
+            let around_s = (of.t_s[window.from] - of.t_s[*from]).max(of.t_s[*to] - of.t_s[window.to]);
+            let sigma = RECORDS.window_spans.iter().zip(&self.sigmas).find(|(span, _)| **span >= to - from);
             around_s < RECORDS.max_undone_s
                 && sigma.is_some_and(|(_, sigma)| {
                     self.excess_of(displacement, sigma, RECORDS.min_surrounding_sigmas).is_some()
                 })
         };
-        longer.filter_map(move |(before, after)| Some((before?, after)).filter(|_| after < of.len())).take_while(within)
+        RECORDS.window_spans.into_iter().filter_map(longer).filter(|longer| longer.to < of.len()).take_while(within)
     }
 
     /// The stretches of one track that are beyond wheels, with the instrument somewhere on the robot: by the
@@ -122,7 +122,7 @@ impl Limits {
             let mut stretches: Vec<Range<usize>> = Vec::new();
             for from in 0..of_track.saturating_sub(span) {
                 let is_tried = tried.iter().any(|range| from < range.end - 1 && range.start < from + span);
-                let window = (from, from + span);
+                let window = Window { from, to: from + span };
                 let residual = calibrated.residual_of(sensor, track, window);
                 if is_tried || calibrated.tracks[track].has_gap(window) || self.excess(&residual, sigma).is_none() {
                     continue;
@@ -139,12 +139,13 @@ impl Limits {
                 let poses =
                     if is_step { stretch } else { stretch.start.saturating_sub(1)..(stretch.end + 1).min(of_track) };
                 tried.push(poses.clone());
-                let window = (poses.start, poses.end - 1);
+                let window = Window { from: poses.start, to: poses.end - 1 };
                 let displacement = calibrated.residual_of(sensor, track, window);
                 let Some(sigmas) = self.excess(&displacement, sigma) else { continue };
                 // Outliers are undone by the next measurement: those before and after it say the same.
-                let Some(before) = window.0.checked_sub(1).filter(|_| window.1 + 1 < of_track) else { continue };
-                let others = [(before, window.1), (window.0, window.1 + 1), (before, window.1 + 1)];
+                let Some(from) = window.from.checked_sub(1).filter(|_| window.to + 1 < of_track) else { continue };
+                let to = window.to + 1;
+                let others = [Window { from, ..window }, Window { to, ..window }, Window { from, to }];
                 let agrees = |other| self.shows(&displacement, &calibrated.residual_of(sensor, track, other));
                 if !others.into_iter().all(agrees)
                     || !self.surrounding(calibrated, track, window, &displacement).all(agrees)
@@ -178,14 +179,9 @@ fn brisk_rates(calibrated: &CalibratedTracks<'_>) -> (f64, f64) {
 }
 
 /// Whether no robot moves so far in the time: by what is faster than anything in this run.
-fn is_too_fast(
-    calibrated: &CalibratedTracks<'_>,
-    track: usize,
-    (from, to): (usize, usize),
-    displacement: &Residual,
-) -> bool {
+fn is_too_fast(calibrated: &CalibratedTracks<'_>, track: usize, window: Window, displacement: &Residual) -> bool {
     let of = &calibrated.tracks[track];
     let fastest = rates(calibrated, track).fold((0.0_f64, 0.0_f64), |most, of| (most.0.max(of.0), most.1.max(of.1)));
-    let time_s = RECORDS.implausible_speed_ratio * (of.t_s[to] - of.t_s[from]);
+    let time_s = RECORDS.implausible_speed_ratio * (of.t_s[window.to] - of.t_s[window.from]);
     displacement.x.hypot(displacement.y) > fastest.0 * time_s || displacement.z.abs() > fastest.1 * time_s
 }

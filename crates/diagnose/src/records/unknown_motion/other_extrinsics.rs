@@ -4,7 +4,7 @@ use dataset::median;
 use kinematics::{Pose, wrap_to_pi};
 
 use super::events::{AnomalyKind, Event, Limits};
-use crate::records::pose_windows::CalibratedTracks;
+use crate::records::pose_windows::{CalibratedTracks, Window};
 use crate::settings::RECORDS;
 
 /// How the instrument is mounted otherwise than in the other runs.
@@ -25,7 +25,7 @@ pub(super) fn other_extrinsics(
         let spoiled: usize = events[track].iter().map(|event| event.poses.len() - 1).sum();
         // What lasts is the mounting's or nobody's.
         let lasts = spoiled as f64 > RECORDS.lasting_share * calibrated.tracks[track].len() as f64;
-        let is_taken = |(from, to): (usize, usize)| {
+        let is_taken = |Window { from, to }: Window| {
             lasts || events[track].iter().all(|event| to <= event.poses.start || from >= event.poses.end - 1)
         };
         let (pose, sigmas) = calibrated.extrinsics(track, is_taken)?;
@@ -35,7 +35,7 @@ pub(super) fn other_extrinsics(
         // Windows of noisy headings err together; the halves of a run do not.
         let middle = calibrated.tracks[track].len() / 2;
         let half = |first: bool| {
-            let is_of_half = |window: (usize, usize)| is_taken(window) && (window.0 < middle) == first;
+            let is_of_half = |window: Window| is_taken(window) && (window.from < middle) == first;
             calibrated.extrinsics(track, is_of_half).map(|(pose, _)| pose)
         };
         let halves = [half(true)?, half(false)?];
