@@ -194,6 +194,9 @@ const FAULTS: &[Fault] = &[
         });
         log.has_rates().then_some(None)
     }),
+    fault("distances and angles cut to whole millimetres and degrees", &["rates_cut"], |log, _| {
+        log.has_rates().then(|| cut_to_steps(log, [1e-3, 1_f64.to_radians()]))
+    }),
     fault("runs of the truth shifted by one", &["truth_runs_shifted"], |log, draws| {
         let runs = log.runs.len();
         let by = if draws.happens(0.5) { 1 } else { runs - 1 };
@@ -236,6 +239,31 @@ fn rescaled(log: &mut Log, draws: &mut Draws, gain: f64, to_end: bool) -> Option
         });
     }
     place
+}
+
+/// Rows of a twentieth of a second at the least, each of whole steps that were driven and turned since the
+/// one before; the rest is lost.
+fn cut_to_steps(log: &mut Log, steps: [f64; 2]) -> Option<Place> {
+    let (is_twist, separation_m) = (log.is("omega"), log.separation_m);
+    let mut cut: Vec<(usize, f64, [f64; 2])> = log.rows[..1].to_vec();
+    let mut since = [0.0; 2];
+    for pair in log.rows.windows(2) {
+        let ((run, from_s, _), (of, t_s, [a, b])) = (pair[0], pair[1]);
+        if of != run {
+            cut.push((of, t_s, [0.0; 2]));
+            since = [0.0; 2];
+            continue;
+        }
+        let twist = if is_twist { [a, b] } else { [0.5 * (a + b), (b - a) / separation_m] };
+        since = [0, 1].map(|k| since[k] + twist[k] * (t_s - from_s));
+        let row_s = t_s - cut[cut.len() - 1].1;
+        if row_s > 0.045 {
+            cut.push((run, t_s, [0, 1].map(|k| (since[k] / steps[k]).trunc() * steps[k] / row_s)));
+            since = [0.0; 2];
+        }
+    }
+    (log.rows, log.head) = (cut, "run,t_s,v_mps,omega_radps".to_owned());
+    None
 }
 
 /// A wheel's column gains 0.02 to 0.3 rad/s, always or where neither wheel turns.

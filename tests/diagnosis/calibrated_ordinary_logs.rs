@@ -15,6 +15,7 @@ use serde_json::Value;
 use crate::ordinary_kinds::{QUARTER, kinds, robots};
 use plain_robot::Change;
 use plain_robot::PlainRobot;
+use plain_robot::Records;
 
 /// Both wheels' diameters and their separation.
 const LENGTHS: [&str; 3] = ["left_wheel_diameter_m", "right_wheel_diameter_m", "wheel_separation_m"];
@@ -101,6 +102,46 @@ fn regress_truth_that_is_late_makes_no_wheel_smaller() {
     // the most. Rejects measurements on the tangent.
     let mean = z.iter().sum::<f64>() / z.len() as f64;
     assert!(mean.abs() < 3.5 * 0.29, "{mean:+.2} {z:.1?}");
+}
+
+/// Speeds that a tachometer measures, or a driver takes from short intervals.
+#[test]
+fn regress_noise_of_recorded_speeds_biases_no_length() {
+    let change: Change = |of| (of.records, of.speed_noise) = (Records::Speeds { step_m_s: 0.0 }, 0.1);
+    let found: Vec<Calibrated> = (640..652_u64).into_par_iter().map(|seed| of_robot(change, seed)).collect();
+    for (length, name) in LENGTHS.iter().enumerate() {
+        let z: Vec<f64> = found.iter().filter_map(|of| of.z.get(length).copied()).collect();
+        assert_eq!(z.len(), 12, "{name}");
+        // Twelve robots, 3.5 standard deviations of their mean. Rejects rates taken as they are: a separation
+        // 2.2 standard deviations too large in the mean.
+        let mean = z.iter().sum::<f64>() / 12.0;
+        assert!(mean.abs() < 3.5 / 12_f64.sqrt(), "{name}: {mean:+.2} {z:.1?}");
+    }
+}
+
+/// Two computers that nobody synchronises, over a session of twenty minutes.
+#[test]
+fn regress_a_clock_that_drifts_over_a_session_is_undone() {
+    let change: Change = |of| (of.clock_gain, of.clock_runs_on) = (-1e-4, true);
+    let found: Vec<Calibrated> = (660..668_u64).into_par_iter().map(|seed| of_robot(change, seed)).collect();
+    for of in &found {
+        assert!(!of.is_refused && of.said.contains("the instrument's clock gains"), "{}", of.said);
+    }
+    // 24 errors; the root mean square of as many is 1 ± 0.25 where lengths of a robot share theirs.
+    let z: Vec<f64> = found.into_iter().flat_map(|of| of.z).collect();
+    let rms = (z.iter().map(|z| z * z).sum::<f64>() / z.len() as f64).sqrt();
+    assert!(z.len() == 24 && rms < 1.75, "{rms} {z:.1?}");
+}
+
+/// A run that was started by hand, of four.
+#[test]
+fn regress_a_run_whose_clock_is_off_refuses_no_log() {
+    let change: Change = |of| (of.runs, of.late_run) = (4, Some((2, 5.0)));
+    let found: Vec<Calibrated> = (680..688_u64).into_par_iter().map(|seed| of_robot(change, seed)).collect();
+    for of in &found {
+        // Rejects a shift of all runs. Three errors of eight robots: one beyond 5 has a chance of 1e-5.
+        assert!(!of.is_refused && of.z.len() == 3 && of.z.iter().all(|z| z.abs() < 5.0), "{:?} {}", of.z, of.said);
+    }
 }
 
 /// A clock that runs at another rate makes wheels of another size where the robot drives steadily.

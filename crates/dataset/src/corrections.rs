@@ -19,6 +19,8 @@ pub(crate) struct Corrections {
     pub(crate) truth_time_factor: f64,
     /// Added to the instrument's times, seconds, after the factors.
     pub(crate) truth_shift_s: f64,
+    /// What the instrument's clock gains on the log's from the start of the session on, seconds a second.
+    pub(crate) truth_clock_rate: f64,
     /// Factor of the instrument's lengths.
     pub(crate) truth_length_factor: f64,
     heading_in_degrees: bool,
@@ -43,6 +45,7 @@ impl Default for Corrections {
             time_factor: 1.0,
             truth_time_factor: 1.0,
             truth_shift_s: 0.0,
+            truth_clock_rate: 0.0,
             truth_length_factor: 1.0,
             heading_in_degrees: false,
             heading_clockwise: false,
@@ -78,7 +81,13 @@ impl Corrections {
         }
         self.wheels(&run.odometry.t_s, &mut run.odometry.wheels);
         run.gyro.iter_mut().for_each(|sample| sample.t_s *= self.time_factor);
-        run.map_measurement_times(|t_s| *t_s = *t_s * self.time_factor * self.truth_time_factor + self.truth_shift_s);
+        let before_s = run.info.start_s.unwrap_or(0.0);
+        run.map_measurement_times(|t_s| {
+            *t_s = *t_s * self.time_factor * self.truth_time_factor + self.truth_shift_s;
+            if self.truth_clock_rate != 0.0 {
+                *t_s = (before_s + *t_s) / (1.0 + self.truth_clock_rate) - before_s;
+            }
+        });
         let length = |length_m: f64| length_m * self.truth_length_factor;
         let turn = |turn: f64| {
             let turn_rad = if self.heading_in_degrees { turn.to_radians() } else { turn };

@@ -5,6 +5,7 @@
 //! it (poses, displacements, marked points or wheel speeds). Estimators take borrowed views ([`Session`],
 //! [`RunView`]), so that a subset of the runs costs nothing.
 
+mod angle_counts;
 mod checked;
 mod column_names;
 mod column_words;
@@ -53,6 +54,7 @@ mod warning;
 mod wheel_angles;
 mod write;
 
+pub use angle_counts::quantum_of_angles;
 pub use checked::{Checked, NotNegative, Number, OutOfRange, Positive, Share, checked};
 pub use column_names::Quantity;
 pub use counter::{suspected_spike, suspected_wrap, wrap_warnings};

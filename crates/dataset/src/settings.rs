@@ -347,7 +347,24 @@ rules::settings! {
     max_side_error: f64 = 0.1,
 }
 
+rules::settings! {
+    AngleCounts
+    /// Steps of an angle below this, radians, are rounding of the file's numbers and no counts.
+    /// Budgeted: files with six decimals round by half of 1e-6, and a step twice.
+    quantum_tolerance: f64 = 3e-6,
+    /// Counts of angles below this, radians, are as good as exact.
+    /// Budgeted: 200 000 counts a turn; on a wheel of 80 mm, 2.5 µm.
+    min_quantum_rad: f64 = 3e-5,
+    /// Steps that must be there before angles are taken for counts.
+    /// Budgeted: chance does not put 98 of 100 on a grid.
+    min_grid_steps: usize = 100,
+    /// Share of steps that are multiples of the smallest one, from which on angles are counts.
+    /// Budgeted: chance has a tenth of them within a twentieth.
+    min_grid_fraction: f64 = 0.98,
+}
+
 rules::rooms! {
+    angle_counts: AngleCounts as ANGLE_COUNTS,
     time_base: TimeBase as TIME_BASE,
     receipt: Receipt as RECEIPT,
     numbering: Numbering as NUMBERING,

@@ -145,7 +145,7 @@ impl<'a> Explained<'_, 'a> {
             spans: tests.spans.as_ref(),
             faults: self.faults,
             clocks: &self.prepared.clocks.offsets,
-            drift: self.prepared.drift.as_ref().map(|found| &found.drift),
+            drift: self.prepared.clocks.drift.as_ref(),
             stamps: self.stamps,
             anomalies: self.prepared.anomalies(),
             uncorrelated: self.uncorrelated,

@@ -17,6 +17,9 @@ use crate::records::record_faults::sessions;
 #[path = "../../estimation/src/tests/golden_numbers.rs"]
 mod golden_numbers;
 
+#[path = "../../preflight/src/clock/driven_runs.rs"]
+pub(crate) mod driven_runs;
+
 /// Refuses numbers that are not those of a file of `tests/golden/`, which YAIR_UPDATE_DOCS=1 writes anew.
 #[track_caller]
 pub(crate) fn assert_unmoved(name: &str, text: &str) {

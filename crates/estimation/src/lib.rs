@@ -35,6 +35,7 @@ mod model_fit;
 mod noise;
 mod noise_score;
 mod noise_shape;
+mod noisy_rates;
 mod normal_equations;
 mod nuisances;
 mod one_step;

@@ -2,7 +2,7 @@
 //! extrinsics and latency where they predict held-out runs; thinning while innovations are not white.
 
 use dataset::Session;
-use preflight::StartValues;
+use preflight::{Clock, StartValues};
 use rayon::prelude::*;
 
 use crate::error::{EstimationError, refuse_wrapped_counters};
@@ -56,14 +56,14 @@ impl FitSettings {
     pub fn instrument(session: &Session<'_>) -> Option<Instrument> {
         let start = StartValues::of(session);
         start.drive?;
-        let clock_s = start.clock_offset_s.unwrap_or(0.0);
+        let clock = Clock { offset_s: start.clock_offset_s.unwrap_or(0.0), ..Clock::default() };
         let ends = ConvergenceCriterion::NoiseShare(COMMON.noise_step_tolerance);
-        let mut fit = ModelFit::started(std::slice::from_ref(session), &[start], &[clock_s], ends, false).ok()?;
+        let mut fit = ModelFit::started(std::slice::from_ref(session), &[start], &[clock], ends, false).ok()?;
         fit.start.body_from_sensor.theta_rad = fit.records.sensor_heading_rad(&fit.start);
         fit.columns.extend(fit.records.extrinsics());
         fit.refit(None, &mut []).ok()?;
         let Instrument { body_from_sensor, latency_s } = fit.solution.model.common_instrument();
-        fit.solution.converged.then_some(Instrument { body_from_sensor, latency_s: clock_s + latency_s })
+        fit.solution.converged.then_some(Instrument { body_from_sensor, latency_s: clock.offset_s + latency_s })
     }
 
     /// The fit, with its criterion of convergence.
@@ -74,14 +74,10 @@ impl FitSettings {
     ) -> Result<ModelFit<'a>, EstimationError> {
         refuse_wrapped_counters(sessions)?;
         let starts: Vec<StartValues> = sessions.par_iter().map(StartValues::of).collect();
-        let seen_s = |start: &StartValues| {
-            start
-                .clock_offset_s
-                .filter(|offset_s| self.nuisances && offset_s.abs() >= COMMON.min_start_clock_s)
-                .unwrap_or(0.0)
-        };
-        let clock_s: Vec<f64> = starts.iter().map(seen_s).collect();
-        let mut found = ModelFit::started(sessions, &starts, &clock_s, ends, self.thin_displacements)?;
+        let is_taken = |clock: &Clock| clock.rate != 0.0 || clock.offset_s.abs() >= COMMON.min_start_clock_s;
+        let seen = |start: &StartValues| start.clock.filter(|clock| self.nuisances && is_taken(clock));
+        let clocks: Vec<Clock> = starts.iter().map(|start| seen(start).unwrap_or_default()).collect();
+        let mut found = ModelFit::started(sessions, &starts, &clocks, ends, self.thin_displacements)?;
         found.free_extrinsics_if_rotated(if self.nuisances { &starts } else { &[] });
         found.first_fit()?;
         found.fix_unobservable()?;
@@ -99,6 +95,9 @@ impl FitSettings {
             found.fit_timing_noise(&mut [])?;
         }
         found.fix_unobservable()?;
+        if self.nuisances {
+            found.unbias_noisy_rates(sessions);
+        }
         Ok(found)
     }
 }

@@ -126,8 +126,8 @@ pub fn fit_large(
     let ids = datasets.iter().map(|blocks| blocks.infos().iter().map(|info| info.id.clone()).collect()).collect();
     first.by_systematic_errors = first.covariance_by_systematic_errors();
     // The subsamples are needed no more.
-    let clock_s = first.records.clock_s.clone();
-    let mut found = first.with_records(Records { ids, clock_s, ..Records::nothing() });
+    let clocks = first.records.clocks.clone();
+    let mut found = first.with_records(Records { ids, clocks, ..Records::nothing() });
     let mut passes = 0;
     loop {
         passes += 1;
@@ -240,8 +240,8 @@ impl ModelFit<'_> {
     fn part_equations(&self, run: (usize, usize), part: &Dataset) -> Result<PartEquations, EstimationError> {
         let sessions = [part.session()];
         refuse_wrapped_counters(&sessions)?;
-        let clock_s = self.records.clock_s.get(run.0).copied().unwrap_or(0.0);
-        let records = Records::relative_to(&sessions, self.prior.measurement_sigma(), &[clock_s], Some(&self.start))
+        let clock = self.records.clocks.get(run.0).copied().unwrap_or_default();
+        let records = Records::relative_to(&sessions, self.prior.measurement_sigma(), &[clock], Some(&self.start))
             .belonging_to(run);
         if records.segments.is_empty() && !records.has_partial() {
             return Ok(PartEquations { run, equations: None, own: None, measurements: 0 });

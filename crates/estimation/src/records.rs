@@ -9,6 +9,7 @@ use std::cell::LazyCell;
 
 use dataset::{CovarianceScale, MapDistortion, Run, RunView, Session, TruthSample};
 use kinematics::Pose;
+use preflight::Clock;
 use rayon::prelude::*;
 use rules::Rule;
 
@@ -38,9 +39,9 @@ pub struct Records<'a> {
     pub unused: Vec<(usize, usize)>,
     /// Ids of all runs by session.
     pub ids: Vec<Vec<String>>,
-    /// By session, what is taken off the stamps of poses and displacements, seconds: how late they were seen
-    /// to be before anything was fitted. A latency that is fitted is what is left.
-    pub clock_s: Vec<f64>,
+    /// By session, the clock of poses and displacements, as far as it was seen before anything was fitted. A
+    /// latency that is fitted is what is left.
+    pub clocks: Vec<Clock>,
 }
 
 impl<'a> Records<'a> {
@@ -52,22 +53,21 @@ impl<'a> Records<'a> {
         Self::started(sessions, &[], stated.as_ref())
     }
 
-    /// The same with `clock_s` of each session taken off its stamps, 0 for sessions beyond its end; and a
-    /// drive to start from.
-    pub(crate) fn started(sessions: &[Session<'a>], clock_s: &[f64], start: Option<&Model>) -> Self {
+    /// The same by the clock of each session, none for sessions beyond the end; and a drive to start from.
+    pub(crate) fn started(sessions: &[Session<'a>], clocks: &[Clock], start: Option<&Model>) -> Self {
         let stated = sessions.first().map(|session| session.truth_noise).unwrap_or_default();
-        Self::relative_to(sessions, NoisePrior::of(stated).measurement_sigma(), clock_s, start)
+        Self::relative_to(sessions, NoisePrior::of(stated).measurement_sigma(), clocks, start)
     }
 
     /// The same relative to given standard deviations of position, metres, and heading, radians.
     pub(crate) fn relative_to(
         sessions: &[Session<'a>],
         reference: [f64; 2],
-        clock_s: &[f64],
+        clocks: &[Clock],
         start: Option<&Model>,
     ) -> Self {
-        let clock_s = |session: usize| clock_s.get(session).copied().unwrap_or(0.0);
-        let mut records = Self { clock_s: (0..sessions.len()).map(clock_s).collect(), ..Self::nothing() };
+        let clock = |session: usize| clocks.get(session).copied().unwrap_or_default();
+        let mut records = Self { clocks: (0..sessions.len()).map(clock).collect(), ..Self::nothing() };
         records.gyro_scale_sigma = sessions.iter().find_map(|session| session.truth_noise.gyro.scale_sigma);
         records.common_scale = sessions.iter().all(has_common_scale);
         records.map = sessions.iter().find_map(|session| session.truth_noise.map);
@@ -86,8 +86,9 @@ impl<'a> Records<'a> {
             let of_run = |(run, base): (&RunView<'a>, &Option<(Segment<'a>, &WheelAngleInterpolator)>)| {
                 let mut segments = Vec::new();
                 let Some((base, track)) = base else { return segments };
-                let late_s = clock_s(number);
-                add_poses(&mut segments, base, track, run.run(), measured_poses(run, reference, late_s));
+                let start_s = run.info().start_s.unwrap_or(0.0);
+                let log_s = |stamp_s: f64| clock(number).log_s(start_s, stamp_s);
+                add_poses(&mut segments, base, track, run.run(), measured_poses(run, reference, log_s));
                 for poses in &mut segments {
                     let Some(nominal) = start else { continue };
                     if !Rule::PosesBetweenRows.is_on() {
@@ -98,7 +99,7 @@ impl<'a> Records<'a> {
                     take_those_near_rows(poses, nominal, reference);
                     let _ = Rule::PosesBetweenRows.applies(poses.measurements.len() < all);
                 }
-                add_displacements(&mut segments, base, track, run.run(), late_s);
+                add_displacements(&mut segments, base, track, run.run(), log_s);
                 segments
             };
             let segments: Vec<Vec<Segment<'a>>> = session.runs.par_iter().zip(&bases).map(of_run).collect();
@@ -129,7 +130,7 @@ impl<'a> Records<'a> {
             common_scale: self.common_scale,
             unused: self.unused.clone(),
             ids: self.ids.clone(),
-            clock_s: self.clock_s.clone(),
+            clocks: self.clocks.clone(),
         }
     }
 
@@ -148,7 +149,7 @@ impl<'a> Records<'a> {
             common_scale: false,
             unused: Vec::new(),
             ids: Vec::new(),
-            clock_s: Vec::new(),
+            clocks: Vec::new(),
         }
     }
 
@@ -318,14 +319,14 @@ fn has_common_scale(session: &Session<'_>) -> bool {
     is_common && session.runs.iter().all(|run| states_all(run.run()))
 }
 
-/// What the instrument measured in a run, `late_s` before its stamps; intervals are not counted yet.
-fn measured_poses(run: &RunView<'_>, reference: [f64; 2], late_s: f64) -> Vec<MeasuredPose> {
+/// What the instrument measured in a run, at the log's instants of its stamps; intervals are not counted yet.
+fn measured_poses(run: &RunView<'_>, reference: [f64; 2], log_s: impl Fn(f64) -> f64) -> Vec<MeasuredPose> {
     let Run { truth, truth_sigma, .. } = run.run();
     if truth.is_empty() {
         let poses = run.observed_poses().into_iter();
         return poses
             .map(|(t_s, Pose { x_m, y_m, theta_rad })| MeasuredPose {
-                t_s: t_s - late_s,
+                t_s: log_s(t_s),
                 x_m,
                 y_m,
                 theta_rad: Some(theta_rad),
@@ -348,7 +349,7 @@ fn measured_poses(run: &RunView<'_>, reference: [f64; 2], late_s: f64) -> Vec<Me
     let of = |(row, sample): (usize, &TruthSample)| {
         let (variance_factor, shape) = noise_of(row);
         MeasuredPose {
-            t_s: sample.t_s - late_s,
+            t_s: log_s(sample.t_s),
             x_m: sample.x_m,
             y_m: sample.y_m,
             theta_rad: sample.theta_rad(),
@@ -435,12 +436,12 @@ fn add_displacements<'a>(
     base: &Segment<'a>,
     track: &WheelAngleInterpolator<'_>,
     run: &Run,
-    late_s: f64,
+    log_s: impl Fn(f64) -> f64,
 ) {
     let mut cursor = track.cursor();
     let mut last_s = f64::NEG_INFINITY;
     for measured in &run.displacements {
-        let [from_s, to_s] = [measured.t0_s, measured.t1_s].map(|stamp_s| stamp_s - late_s);
+        let [from_s, to_s] = [measured.t0_s, measured.t1_s].map(&log_s);
         if run.is_motion_unknown(from_s, to_s) {
             continue;
         }

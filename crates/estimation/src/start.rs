@@ -2,7 +2,7 @@
 
 use dataset::Session;
 use kinematics::{Pose, wrap_to_pi};
-use preflight::{DriveStart, StartValues};
+use preflight::{Clock, DriveStart, StartValues};
 
 use crate::error::EstimationError;
 use crate::model::{Column, GroupExtrinsics, Grouping, Instrument, Model};
@@ -12,21 +12,21 @@ use crate::records::Records;
 use crate::settings::COMMON;
 
 impl<'a> ModelFit<'a> {
-    /// Nothing is fitted: the sessions' records with `clock_s` of each taken off its stamps, the drive that
+    /// Nothing is fitted: the sessions' records by the clock of each, the drive that
     /// windows of motion show, and a free latency where a clock is off.
     pub(crate) fn started(
         sessions: &[Session<'a>],
         starts: &[StartValues],
-        clock_s: &[f64],
+        clocks: &[Clock],
         ends: ConvergenceCriterion,
         displacements_in_series: bool,
     ) -> Result<Self, EstimationError> {
         let first = sessions.first().ok_or(EstimationError::NoSession)?;
         let nominal = Model::of(&first.robot.geometry()?, 0);
         let start = started(&nominal, starts);
-        let records = Records::started(sessions, clock_s, Some(&start));
+        let records = Records::started(sessions, clocks, Some(&start));
         let mut fit = Self::of_records(sessions, records, [nominal, start], ends, displacements_in_series);
-        if clock_s.iter().any(|clock_s| *clock_s != 0.0) {
+        if clocks.iter().any(|clock| *clock != Clock::default()) {
             fit.columns.push(Column::Latency);
         }
         Ok(fit)

@@ -5,12 +5,12 @@
 //! same motion. A log whose rows jitter begins a little after its run does: half of an interval before the
 //! first row and after the last, the speeds of the interval there go on.
 
-use dataset::{NominalRobot, RestoredMotion, Run, RunView, WheelLog, row_jitter_s};
+use dataset::{NominalRobot, RestoredMotion, Run, RunView, WheelLog, quantum_of_angles, row_jitter_s};
 use kinematics::{Count, Wheels};
 
 use crate::recorded_rates::{RateRounding, RateSteps, RecordedRates};
 use crate::settings::{COMMON, TIME_TOLERANCE_S};
-use crate::wheel_rates::{RateWindow, WheelRates, are_inexact, quantum_of_angles};
+use crate::wheel_rates::{RateWindow, WheelRates, are_inexact};
 
 /// A stretch of the log within one row.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -149,31 +149,6 @@ impl WheelRates {
     }
 }
 
-/// What a count of recorded angles stands for, where nearly all steps are multiples of one angle: a driver
-/// that turns counts into angles leaves them rounded. 0 where they are not. The greatest common divisor by
-/// Euclid, up to the rounding of the file's numbers.
-pub(crate) fn quantum_of_angles(angle_rad: &[f64]) -> f64 {
-    let steps =
-        || angle_rad.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > COMMON.quantum_tolerance);
-    let divisor = |mut a: f64, mut b: f64| {
-        while b > COMMON.quantum_tolerance {
-            (a, b) = (b, (a - (a / b).round() * b).abs());
-        }
-        a
-    };
-    let quantum = steps()
-        .take(COMMON.min_grid_steps)
-        .fold(0.0, |quantum: f64, step| divisor(quantum.max(step), quantum.min(step)));
-    if quantum < COMMON.min_quantum_rad || steps().count() < COMMON.min_grid_steps {
-        return 0.0;
-    }
-    let (on_grid, all) = steps().fold((0.0, 0.0_f64), |(on_grid, all), step| {
-        let off_rad = step - (step / quantum).round() * quantum;
-        (on_grid + f64::from(u8::from(off_rad.abs() < 0.1 * quantum)), all + 1.0)
-    });
-    if on_grid >= COMMON.min_grid_fraction * all { quantum } else { 0.0 }
-}
-
 /// Is the noise of the rates of the centre and of the turn below a fraction of their own variance?
 fn is_below_signal(
     rates: &[Vec<f64>; 2],

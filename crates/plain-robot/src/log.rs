@@ -120,7 +120,11 @@ impl PlainRobot {
                 writeln!(odometry, "{id},{:.6},{left},{right}", 1e-3 * step as f64).expect("text");
                 continue;
             }
-            let values = self.recorded(counts, filtered_m_s);
+            let mut noisy_m_s = filtered_m_s;
+            if self.speed_noise > 0.0 {
+                noisy_m_s.iter_mut().for_each(|m_s| *m_s *= 1.0 + self.speed_noise * draws.normal());
+            }
+            let values = self.recorded(counts, noisy_m_s);
             if is_lost || is_unchanged {
                 continue;
             }

@@ -108,6 +108,8 @@ pub struct PlainRobot {
     pub has_rates_of_instants: bool,
     /// Time constant of the filter of recorded speeds.
     pub speed_filter_s: f64,
+    /// Standard deviation of recorded speeds, as a share of the speed.
+    pub speed_noise: f64,
     /// What the counters hold when a run begins.
     pub first_count: f64,
     /// Poses a second.
@@ -216,6 +218,7 @@ impl PlainRobot {
             knows_wheels: false,
             has_rates_of_instants: false,
             speed_filter_s: 0.0,
+            speed_noise: 0.0,
             first_count: 0.0,
             truth_hz: 10.0,
             truth_stamps: Stamps::Exact,

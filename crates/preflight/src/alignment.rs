@@ -3,23 +3,11 @@
 use kinematics::Wheels;
 use rayon::prelude::*;
 
+use crate::clock::model::Clock;
 use crate::regression::regress;
 use crate::run_log::RunLog;
 use crate::settings::CHECKS;
 use crate::windows::{Measured, Window};
-
-/// A clock of the instrument: a stamp t is of the log's instant (t − offset)/(1 + rate).
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct Clock {
-    pub(crate) offset_s: f64,
-    pub(crate) rate: f64,
-}
-
-impl Clock {
-    pub(crate) fn log_s(self, stamp_s: f64) -> f64 {
-        (stamp_s - self.offset_s) / (1.0 + self.rate)
-    }
-}
 
 /// Turns of the wheels in a window's two intervals.
 #[derive(Debug, Clone, Copy)]
@@ -33,10 +21,11 @@ pub(crate) struct Paired {
 pub(crate) fn paired(windows: &[Window], runs: &[RunLog], clock: Clock) -> Vec<Paired> {
     let pair = |window: &Window| {
         let run = &runs[window.run];
-        let moved = run.turned(clock.log_s(window.from_s), clock.log_s(window.to_s))?;
+        let log_s = |stamp_s| clock.log_s(run.start_s, stamp_s);
+        let moved = run.turned(log_s(window.from_s), log_s(window.to_s))?;
         let turned = match window.turn {
             Some((from_s, to_s, turn_rad)) if (from_s, to_s) == (window.from_s, window.to_s) => Some((moved, turn_rad)),
-            Some((from_s, to_s, turn_rad)) => Some((run.turned(clock.log_s(from_s), clock.log_s(to_s))?, turn_rad)),
+            Some((from_s, to_s, turn_rad)) => Some((run.turned(log_s(from_s), log_s(to_s))?, turn_rad)),
             None => None,
         };
         Some(Paired { window: *window, moved, turned })
@@ -148,7 +137,7 @@ impl Comparison<'_> {
             let count = ((to_s - from_s) / step_s).ceil() as usize;
             let at = |k: usize| {
                 let offset_s = from_s + step_s * k as f64;
-                Some((offset_s, self.at(Clock { offset_s, rate: 0.0 })?))
+                Some((offset_s, self.at(Clock { offset_s, ..Clock::default() })?))
             };
             let all: Vec<_> = (0..=count).into_par_iter().map(at).collect();
             for (offset_s, found) in all.into_iter().flatten() {
@@ -162,10 +151,14 @@ impl Comparison<'_> {
         let (offset_s, explained) = best?;
         // Curvature of the cost: that of a parabola through its neighbours a coarse step away.
         let step_s = CHECKS.clock_steps_s[1];
-        let beside = [-step_s, step_s].map(|by_s| self.at(Clock { offset_s: offset_s + by_s, rate: 0.0 }));
+        let beside = [-step_s, step_s].map(|by_s| self.at(Clock { offset_s: offset_s + by_s, ..Clock::default() }));
         let rise = beside.iter().flatten().map(|found| explained.gain_over(found)).fold(0.0_f64, f64::max);
         let sigma_s = step_s / (2.0 * rise.max(1e-9)).sqrt();
-        Some(BestClock { clock: Clock { offset_s, rate: 0.0 }, explained, sigma_s: sigma_s.min(high_s - low_s) })
+        Some(BestClock {
+            clock: Clock { offset_s, ..Clock::default() },
+            explained,
+            sigma_s: sigma_s.min(high_s - low_s),
+        })
     }
 
     /// Offsets at which some records overlap.
@@ -185,50 +178,5 @@ impl Comparison<'_> {
         let middle_s = 0.5 * (low_s + high_s);
         let half_s = (0.5 * (high_s - low_s)).min(CHECKS.max_clock_offset_s);
         (low_s <= high_s).then_some((middle_s - half_s, middle_s + half_s))
-    }
-
-    /// The best rate beside a known offset, with the offset that goes with it: over a grid of rates that turn
-    /// the clock about the start of the records or about the middle of the longest, and then in turns.
-    pub(crate) fn best_rate(&self, near: Clock) -> Option<(Clock, Explained)> {
-        let [most, step] = CHECKS.clock_rates;
-        let middle_s = 0.5 * self.windows.iter().map(|window| window.to_s.abs()).fold(0.0, f64::max);
-        let mut best: Option<(Clock, Explained)> = None;
-        let consider = |clock: Clock, found: Option<Explained>, best: &mut Option<(Clock, Explained)>| {
-            let Some(found) = found else { return };
-            if best.is_none_or(|(_, best)| found.cost < best.cost) {
-                *best = Some((clock, found));
-            }
-        };
-        let count = (most / step).round() as i32;
-        let of_rate =
-            |rate: f64| [0.0, near.offset_s, near.offset_s - rate * middle_s].map(|offset_s| Clock { offset_s, rate });
-        // In a long log, a small rate makes clocks as far apart as a large one in a short log.
-        let small = (1..=CHECKS.small_rate_halvings).flat_map(|halvings| {
-            let rate = step * 0.5_f64.powi(halvings);
-            [-rate, rate]
-        });
-        let rates = (-count..=count).map(|k| step * f64::from(k)).chain(small);
-        let grid: Vec<Clock> = rates.flat_map(of_rate).collect();
-        let all: Vec<_> = grid.into_par_iter().map(|clock| (clock, self.at(clock))).collect();
-        all.into_iter().for_each(|(clock, found)| consider(clock, found, &mut best));
-        let (mut step, mut step_s) = (0.5 * step, CHECKS.clock_steps_s[1]);
-        for _ in 0..9 {
-            for _ in 0..2 {
-                for by in [-2.0, -1.0, 1.0, 2.0] {
-                    let (at, _) = best?;
-                    let beside = Clock { rate: at.rate + by * step, ..at };
-                    consider(beside, self.at(beside), &mut best);
-                    // About the middle, too: what a rate changes there an offset must not undo.
-                    let (at, _) = best?;
-                    let rate = at.rate + by * step;
-                    let beside = Clock { rate, offset_s: at.offset_s - by * step * middle_s };
-                    consider(beside, self.at(beside), &mut best);
-                    let beside = Clock { offset_s: at.offset_s + by * step_s, ..at };
-                    consider(beside, self.at(beside), &mut best);
-                }
-            }
-            (step, step_s) = (0.4 * step, 0.4 * step_s);
-        }
-        best
     }
 }

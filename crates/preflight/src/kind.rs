@@ -18,7 +18,7 @@ pub(crate) enum Kind {
     /// Clocks are apart: truth's stamps are too large by so much.
     ClockOffset { offset_s: f64, sigma_s: f64 },
     /// Truth's clock is fast by this share.
-    ClockRate { rate: f64 },
+    ClockRate { rate: f64, of_session: bool },
     /// Headings are in degrees.
     HeadingInDegrees,
     /// Headings count clockwise.

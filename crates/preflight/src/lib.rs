@@ -8,9 +8,12 @@
 //! silent.
 
 mod alignment;
+mod clock;
 mod driven;
 mod gain_change;
 mod geometry_estimate;
+#[cfg(test)]
+mod golden;
 mod kind;
 mod problem;
 mod problems;
@@ -31,6 +34,7 @@ use dataset::Dataset;
 use kind::Kind;
 use rayon::prelude::*;
 
+pub use clock::{Clock, ClockDrift, ClockOffset, ClockOffsets, ClockSearch};
 pub use driven::Driven;
 pub use problem::{Problem, Severity};
 pub use problems::remedies::{Remedy, WouldDetermine};

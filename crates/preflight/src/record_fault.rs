@@ -23,6 +23,8 @@ pub(crate) enum RecordFault {
     ZeroRates { from: Place, rows: usize, share: f64 },
     /// Speeds leap from one end of their range to the other.
     RatesWrap { from: Place, rows: usize },
+    /// Values are cut to whole steps toward zero, in such a share of the rows in which the robot drives.
+    RatesCut { share: f64 },
     /// What the truth says of a run is of one so many later in the log.
     RunsShifted { ids: [String; 2], by: f64 },
     /// Poses repeat the one before while the wheels turn, in such a share of the steps.
@@ -85,6 +87,7 @@ impl RecordFault {
             Self::ConstantGyro { .. } => "gyro_constant",
             Self::ZeroRates { .. } => "rates_of_no_message",
             Self::RatesWrap { .. } => "rates_wrap",
+            Self::RatesCut { .. } => "rates_cut",
             Self::RunsShifted { .. } => "truth_runs_shifted",
             Self::HeldPoses { .. } => "poses_held",
         }
@@ -109,6 +112,10 @@ impl RecordFault {
         ),
         Self::RatesWrap { from, rows } => format!(
             "speeds leap from one end of their range to the other and back, first at {from}, {rows} rows in all: they wrap at the largest number of their type; record them in a wider one, or add its range to these rows"
+        ),
+        Self::RatesCut { share } => format!(
+            "{:.0} % of the rows in which the robot drives are whole steps that were cut toward zero, as distances and angles since the last row in whole millimetres and degrees: each row loses half of a step on average, which no later row makes up for; record counts, or sum up before values are rounded",
+            100.0 * share
         ),
         Self::RunsShifted { ids: [first, other], by } => format!(
             "run ids of the truth are shifted by {by} against those of the log: what the truth calls \"{first}\" is run \"{other}\" of the log, and so on; mend the ids in truth.csv"

@@ -9,6 +9,8 @@ use crate::settings::CHECKS;
 #[derive(Debug, Clone)]
 pub(crate) struct RunLog {
     pub(crate) id: String,
+    /// When it began on the session's clock, seconds.
+    pub(crate) start_s: f64,
     pub(crate) protocol: Option<Protocol>,
     pub(crate) turn_rad: Option<f64>,
     pub(crate) continuous: bool,
@@ -106,6 +108,7 @@ impl RunLog {
         }
         Some(Self {
             id: run.info().id.clone(),
+            start_s: run.info().start_s.unwrap_or(0.0),
             protocol: run.info().protocol,
             turn_rad: run.info().settings.turn_rad,
             continuous: run.info().continuous,

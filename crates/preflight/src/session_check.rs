@@ -3,7 +3,8 @@
 use dataset::{NominalRobot, Session};
 use kinematics::Wheels;
 
-use crate::alignment::{Clock, Comparison, Explained, Paired, paired};
+use crate::alignment::{Comparison, Explained, Paired, paired};
+use crate::clock::model::Clock;
 use crate::geometry_estimate::{GeometryEstimate, OneDirection};
 use crate::problem::Problem;
 use crate::run_log::{RunLog, m_per_rad};

@@ -2,7 +2,7 @@
 
 use dataset::Dataset;
 
-use crate::alignment::Clock;
+use crate::clock::model::Clock;
 use crate::problems;
 use crate::session_check::SessionCheck;
 use crate::windows::Reading;
@@ -18,14 +18,14 @@ pub(crate) fn checked(dataset: &Dataset) -> SessionCheck {
         return check;
     }
     problems::held_poses::found(&mut check);
-    problems::rate_rows::found(&mut check);
+    let is_rough = problems::rate_rows::found(&mut check);
     if problems::idle_columns::found(&mut check, dataset) {
         return check;
     }
     problems::run_order::found(&mut check);
     let before = check.problems.len();
     // With headings as they are read, and clocks that are one.
-    let mut is_cut = problems::wheel_changes::found(&mut check, Reading::AS_IS, Clock::default());
+    let mut is_cut = is_rough || problems::wheel_changes::found(&mut check, Reading::AS_IS, Clock::default());
     check.matched = problems::clock::matched(&mut check);
     let other = check.matched.as_ref().map(|of| (of.reading, of.clock));
     if let Some((reading, clock)) = other.filter(|of| !is_cut && *of != (Reading::AS_IS, Clock::default()))

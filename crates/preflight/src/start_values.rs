@@ -4,8 +4,8 @@
 use dataset::{RunView, Session};
 use kinematics::Wheels;
 
-use crate::alignment::Clock;
-use crate::problems::clock::{best_clock, offset_gain};
+use crate::clock::model::Clock;
+use crate::problems::clock::{best_clock, clock_drift, offset_gain};
 use crate::regression::slope;
 use crate::run_log::RunLog;
 use crate::session_check::SessionCheck;
@@ -15,7 +15,9 @@ use crate::windows::Reading;
 /// What the windows of a session's motion say of its clock and of the drive.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StartValues {
-    /// How late the instrument's stamps are against the log's, seconds, where an offset is seen.
+    /// The instrument's clock, where an offset or a rate is seen.
+    pub clock: Option<Clock>,
+    /// How late the instrument's stamps are against the log's by one offset, seconds, where it is seen.
     pub clock_offset_s: Option<f64>,
     /// The drive, where the windows determine it.
     pub drive: Option<DriveStart>,
@@ -41,6 +43,9 @@ impl StartValues {
         let clock = best_clock(&check, Reading::AS_IS, as_is)
             .filter(|best| offset_gain(&check, Reading::AS_IS, as_is, best.clock, best.sigma_s).is_some())
             .map(|best| best.clock);
+        let drift = clock_drift(&check, Reading::AS_IS, clock.unwrap_or_default());
+        let clock_offset_s = clock.map(|clock| clock.offset_s);
+        let clock = drift.map(|drift| drift.clock).or(clock);
         let drive = check.matched_at(Reading::AS_IS, clock.unwrap_or_default()).and_then(|matched| {
             let geometry = matched.geometry?;
             // All negative: an instrument that looks backwards.
@@ -53,7 +58,7 @@ impl StartValues {
                 sensor_rad: geometry.sensor_rad,
             })
         });
-        Self { clock_offset_s: clock.map(|clock| clock.offset_s), drive: drive.or_else(|| by_gyro(session, &check)) }
+        Self { clock, clock_offset_s, drive: drive.or_else(|| by_gyro(session, &check)) }
     }
 }
 

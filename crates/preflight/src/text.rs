@@ -61,7 +61,7 @@ pub(crate) fn sentence(kind: &Kind, runs: Option<&[String]>) -> String {
         ),
         Kind::TruthTimeUnit { unit, of_truth } => truth_time_unit(*unit, *of_truth),
         Kind::ClockOffset { offset_s, sigma_s } => clock_offset(*offset_s, *sigma_s),
-        Kind::ClockRate { rate } => clock_rate(*rate),
+        Kind::ClockRate { rate, of_session } => clock_rate(*rate, *of_session),
         Kind::HeadingInDegrees => "theta_rad of truth.csv is in degrees; multiply it by π/180".to_owned(),
         Kind::HeadingClockwise => {
             "theta_rad of truth.csv counts clockwise; it is counter-clockwise positive: change its sign".to_owned()
@@ -152,11 +152,17 @@ fn clock_offset(offset_s: f64, sigma_s: f64) -> String {
     )
 }
 
-fn clock_rate(rate: f64) -> String {
+fn clock_rate(rate: f64, of_session: bool) -> String {
+    let way = if rate > 0.0 { "fast" } else { "slow" };
+    if of_session {
+        let ppm = 1e6 * rate.abs();
+        return format!(
+            "truth's clock runs {ppm:.0} ppm {way} against the log's from the start of the session on; calibrate undoes that"
+        );
+    }
     format!(
-        "truth's clock runs {:.2} % {} against the log's, and wheels come out as wrong; multiply truth's times by {:.5}",
+        "truth's clock runs {:.2} % {way} against the log's, and wheels come out as wrong; multiply truth's times by {:.5}",
         100.0 * rate.abs(),
-        if rate > 0.0 { "fast" } else { "slow" },
         1.0 / (1.0 + rate)
     )
 }
@@ -255,7 +261,8 @@ pub(crate) fn fix(kind: &Kind) -> Option<String> {
             corrections(format!("truth_time_factor = {}", CHECKS.time_units[*unit].recip()))
         }
         Kind::ClockOffset { offset_s, .. } => corrections(format!("truth_shift_s = {:.3}", -offset_s)),
-        Kind::ClockRate { rate } => corrections(format!("truth_time_factor = {:.5}", 1.0 / (1.0 + rate))),
+        Kind::ClockRate { rate, of_session: true } => corrections(format!("truth_clock_rate = {rate:.6}")),
+        Kind::ClockRate { rate, .. } => corrections(format!("truth_time_factor = {:.5}", 1.0 / (1.0 + rate))),
         Kind::HeadingInDegrees => corrections("heading_in_degrees = true".to_owned()),
         Kind::HeadingClockwise => corrections("heading_clockwise = true".to_owned()),
         Kind::AxesMirrored { axis } => corrections(

@@ -27,7 +27,7 @@ impl Reading {
         wrap_to_pi(if self.clockwise { -turn_rad } else { turn_rad })
     }
 
-    fn heading_rad(self, heading: f64) -> f64 {
+    pub(crate) fn heading_rad(self, heading: f64) -> f64 {
         let heading_rad = if self.degrees { heading.to_radians() } else { heading };
         if self.clockwise { -heading_rad } else { heading_rad }
     }

@@ -21,7 +21,7 @@ use estimation::{
 use kinematics::Pose;
 use motion_programs::Schedule;
 use nalgebra::{Matrix3, Vector3};
-use preflight::Driven;
+use preflight::{Clock, Driven};
 
 use crate::dead_reckoning_jacobian::{HARDLY_TURN, ON_THE_SPOT, WHEEL_HARDLY_TURNS, unobservable};
 use crate::estimate::{
@@ -199,7 +199,7 @@ fn calibration(fit: &ModelFit<'_>, ticks_per_rev: Option<f64>, names: &[&str]) -
         extrinsics,
         latency_s: fit.has(Column::Latency).then_some((mean_clock_s(fit) + instrument.latency_s, latency_sigma_s)),
         group_instruments: group_instruments(fit, names),
-        seen: moved(fit, names).into_iter().chain(turn_loss).collect(),
+        seen: moved(fit, names).into_iter().chain(clock_rates(fit, names)).chain(turn_loss).collect(),
         runs_rejected: rejected(fit),
         ..drive
     })
@@ -295,13 +295,29 @@ fn rejected(fit: &ModelFit<'_>) -> Vec<Rejected> {
 
 /// What was taken off the stamps before the fit, in the mean of the sessions, seconds.
 fn mean_clock_s(fit: &ModelFit<'_>) -> f64 {
-    fit.records.clock_s.iter().sum::<f64>() / fit.records.clock_s.len().max(1) as f64
+    let clocks = &fit.records.clocks;
+    clocks.iter().map(|clock| clock.offset_s).sum::<f64>() / clocks.len().max(1) as f64
+}
+
+/// Clocks that run at other rates, which were undone before the fit.
+fn clock_rates<'n>(fit: &ModelFit<'_>, names: &'n [&str]) -> impl Iterator<Item = String> + use<'n> {
+    let rates: Vec<Clock> = fit.records.clocks.clone();
+    let of = |(clock, name): (Clock, &&str)| {
+        let (way, since) =
+            (if clock.rate > 0.0 { "gains" } else { "loses" }, if clock.of_session { "session" } else { "run" });
+        let ppm = 1e6 * clock.rate.abs();
+        let sentence = format!(
+            "{name}: the instrument's clock {way} {ppm:.0} ppm on the log's from the start of the {since} on, which is undone"
+        );
+        (clock.rate != 0.0).then_some(sentence)
+    };
+    rates.into_iter().zip(names).filter_map(of)
 }
 
 /// What differs for certain between the instruments of the first session and another. Clocks that were taken
 /// off the stamps before the fit are apart by more than any doubt.
 fn moved(fit: &ModelFit<'_>, names: &[&str]) -> Vec<String> {
-    let clock_s = |session: usize| fit.records.clock_s.get(session).copied().unwrap_or(0.0);
+    let clock_s = |session: usize| fit.records.clocks.get(session).map_or(0.0, |clock| clock.offset_s);
     let sentence = |[first, other]: [usize; 2], what: &str| {
         let names = format!("{} and {}", names[first], names[other]);
         format!("between {names} the instrument {what}: it was mounted anew, or its clock set")
@@ -344,7 +360,7 @@ fn moved(fit: &ModelFit<'_>, names: &[&str]) -> Vec<String> {
 
 /// The instruments of groups, by the sessions' names.
 fn group_instruments(fit: &ModelFit<'_>, names: &[&str]) -> Vec<GroupInstrument> {
-    let clock_s = &fit.records.clock_s;
+    let clock_s: Vec<f64> = fit.records.clocks.iter().map(|clock| clock.offset_s).collect();
     let Some(own) = &fit.solution.model.own else {
         // Clocks that were apart before the fit.
         let are_apart = clock_s.iter().any(|clock_s_of| *clock_s_of != clock_s[0]);
@@ -353,7 +369,7 @@ fn group_instruments(fit: &ModelFit<'_>, names: &[&str]) -> Vec<GroupInstrument>
             latency_s: Some(clock_s + latency_s),
             ..GroupInstrument::new(name)
         };
-        return names.iter().zip(clock_s).filter(|_| are_apart).map(of).collect();
+        return names.iter().zip(&clock_s).filter(|_| are_apart).map(of).collect();
     };
     let name = |(session, run): (usize, usize)| {
         let session_name = names[session].to_owned();

@@ -311,6 +311,7 @@ impl Source<'_> {
         ] {
             self.positive(key, &Spanned::new(span.clone(), factor))?;
         }
+        self.positive("1 + truth_clock_rate", &Spanned::new(span.clone(), 1.0 + corrections.truth_clock_rate))?;
         self.finite("truth_shift_s", &Spanned::new(span, corrections.truth_shift_s))?;
         Ok(corrections)
     }

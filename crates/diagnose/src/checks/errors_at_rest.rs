@@ -17,7 +17,7 @@ use estimation::WheelAngleInterpolator;
 use kinematics::wrap_to_pi;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use crate::records::clock_profile::turns_at;
+use crate::records::pose_windows::turns_at;
 use crate::settings::RESIDUALS;
 
 /// Errors of an instrument while the robot stands, beside residuals of its drives that are autocorrelated.

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use effects::{CATALOGUE, Description, Hypothesis, Sign, hypothesis};
 use estimation::{ModelFit, NoiseComponent};
+use preflight::ClockDrift;
 
 use crate::candidates::candidate::Candidate;
 use crate::candidates::cause::{Basis, Cause, Doubt};
@@ -17,8 +18,7 @@ use crate::findings::lack_of_fit::FormDeviation;
 use crate::fits::model_comparison::relative_odds;
 use crate::fits::statistics::{p_of_chi_square, sidak, z_of_p};
 use crate::fits::wald::Test;
-use crate::records::clock_drift::ClockDrift;
-use crate::records::clock_offsets::ClockOffset;
+use crate::records::clocks::ClockOffset;
 use crate::records::record_faults::Fault;
 use crate::records::stamp_errors::StampError;
 use crate::search::rivals::Name;
@@ -342,7 +342,7 @@ pub(crate) fn of_geometry(deviation: GeometryDeviation, without: &[String]) -> F
 }
 
 /// The finding of a clock that is far off.
-pub(crate) fn of_clock(offset: &ClockOffset, without: &[String]) -> Finding {
+pub(crate) fn of_clock(ClockOffset { runs, of: offset }: &ClockOffset, without: &[String]) -> Finding {
     let (cause, parameters) = match nameable(|description| description.clock_offset, without) {
         Some((id, name)) => {
             let value = Value { value: offset.offset_s, sigma: Some(offset.sigma_s), unit: "s".to_owned() };
@@ -352,20 +352,22 @@ pub(crate) fn of_clock(offset: &ClockOffset, without: &[String]) -> Finding {
     };
     let basis = Basis::ClockOffset(offset.offset_s);
     let found = of_causes(vec![cause], p_of_chi_square(2.0 * offset.gain, 1.0), parameters, basis);
-    Finding { runs: offset.runs.clone(), ..found }
+    Finding { runs: runs.clone(), ..found }
 }
 
 /// The finding of a clock that runs fast or slow.
 pub(crate) fn of_drift(drift: &ClockDrift, without: &[String]) -> Finding {
-    let rate = Value { value: drift.rate, sigma: Some(drift.sigma), unit: "1".to_owned() };
+    // What the robot's clock gains on the instrument's.
+    let gains = (1.0 + drift.clock.rate).recip() - 1.0;
+    let rate = Value { value: gains, sigma: Some(drift.sigma), unit: "1".to_owned() };
     let since = Value { value: 1.0, sigma: None, unit: "1".to_owned() };
-    let since = drift.of_session.then(|| ("since_session_start".to_owned(), since));
+    let since = drift.clock.of_session.then(|| ("since_session_start".to_owned(), since));
     let is_clock_rate = |description: Description| description.is_clock_rate.then_some(());
     let (cause, parameters) = match nameable(is_clock_rate, without) {
         Some((id, ())) => (Cause::Effect(id), [("rate".to_owned(), rate)].into_iter().chain(since).collect()),
         None => (Cause::Unknown, BTreeMap::new()),
     };
-    of_causes(vec![cause], p_of_chi_square(2.0 * drift.gain, 1.0), parameters, Basis::ClockDrift(drift.rate))
+    of_causes(vec![cause], p_of_chi_square(2.0 * drift.gain, 1.0), parameters, Basis::ClockDrift(gains))
 }
 
 /// The finding of an error of the stamps.

@@ -5,6 +5,8 @@ use dataset::Dataset;
 use effects::GeometryRatio;
 use rules::Rule;
 
+use preflight::ClockDrift;
+
 use crate::candidates::cause::{Basis, Doubt};
 use crate::carry_over::CarryOver;
 use crate::checks::check::TestResult;
@@ -18,8 +20,7 @@ use crate::findings::mean_lateness::join_clock;
 use crate::findings::noise_effects::scatter;
 use crate::findings::systematic_errors::without_systematic_errors;
 use crate::fits::wald::wald_test;
-use crate::records::clock_drift::ClockDrift;
-use crate::records::clock_offsets::ClockOffset;
+use crate::records::clocks::ClockOffset;
 use crate::records::record_faults::{Fault, wrong_wheels};
 use crate::records::stamp_errors::{StampError, have_uncertain_rows};
 use crate::records::unknown_motion::Anomaly;

@@ -1,8 +1,6 @@
 //! Faults of the records, clocks, and runs and intervals that do not belong: before any effect is sought.
 
-pub(crate) mod clock_drift;
-pub(crate) mod clock_offsets;
-pub(crate) mod clock_profile;
+pub(crate) mod clocks;
 pub(crate) mod large_log;
 pub(crate) mod log;
 pub(crate) mod log_rows;

@@ -13,7 +13,6 @@ use kinematics::{Increment, Pose, Wheels, wrap_to_pi};
 use nalgebra::{Matrix2, Matrix3, Matrix4, Vector2, Vector3, Vector4};
 use rayon::prelude::*;
 
-use crate::records::clock_profile::turns_at;
 use crate::records::log_rows::has_outlying_rows;
 use crate::settings::RECORDS;
 
@@ -368,12 +367,19 @@ impl Extrinsics {
     }
 }
 
+/// Turns of the wheels at an instant of the log, between rows in proportion.
+pub(crate) fn turns_at(rows_s: &[f64], turns: &Wheels<Vec<f64>>, t_s: f64) -> Wheels<f64> {
+    let row = rows_s.partition_point(|row_s| *row_s <= t_s).clamp(1, rows_s.len() - 1) - 1;
+    let share = ((t_s - rows_s[row]) / (rows_s[row + 1] - rows_s[row])).clamp(0.0, 1.0);
+    turns.as_ref().map(|turns| turns[row] + share * (turns[row + 1] - turns[row]))
+}
+
 #[cfg(test)]
 mod tests {
     use dataset::{Odometry, Run, RunInfo, WheelLog};
 
     use super::*;
-    use crate::records::clock_profile::tests::driven;
+    use crate::small_robot::driven_runs::driven;
 
     #[test]
     fn windows_have_the_rows_between_their_poses_and_know_where_some_are_missing() {

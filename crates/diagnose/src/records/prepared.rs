@@ -6,9 +6,7 @@ use rayon::prelude::*;
 use rules::Rule;
 
 use crate::candidates::candidate::Candidate;
-use crate::records::clock_drift::{DriftFound, clock_drift};
-use crate::records::clock_offsets::{Clocks, clock_offsets};
-use crate::records::clock_profile::RunClock;
+use crate::records::clocks::Clocks;
 use crate::records::log::Log;
 use crate::records::stamp_errors::{StampError, stamp_error_by_counts, uncertain_tick_s};
 use crate::records::unknown_motion::{Anomaly, UnknownMotions, unknown_motions};
@@ -18,9 +16,7 @@ pub(crate) struct Prepared<'d> {
     recorded: &'d [Dataset],
     /// Stamps that the counts show to be wrong.
     pub(crate) by_counts: Option<StampError>,
-    /// A drift of all clocks.
-    pub(crate) drift: Option<DriftFound>,
-    /// Clocks that are far apart.
+    /// Clocks that are far apart, or drift.
     pub(crate) clocks: Clocks,
     odd: Option<UnknownMotions>,
 }
@@ -35,29 +31,22 @@ impl<'d> Prepared<'d> {
         });
         let by_counts = Rule::StampsByCounts.finds(stamp_error_by_counts(recorded, every_term));
         let datasets = by_counts.as_ref().map_or(recorded, |error| &error.records[..]);
-        let of_runs = RunClock::of_all(datasets);
-        let drift = Rule::ClockDrift.finds(clock_drift(datasets, &of_runs, min_common_clock_s));
-        let (datasets, of_runs) = match &drift {
-            Some(found) => (&found.records[..], &found.clocks),
-            None => (datasets, &of_runs),
-        };
-        let clocks = clock_offsets(datasets, of_runs, min_common_clock_s);
+        let clocks = Clocks::of(datasets, min_common_clock_s);
         let datasets = clocks.records.as_deref().unwrap_or(datasets);
         let odd = unknown_motions(datasets, clocks.remaining_s, uncertain_tick_s(recorded), log.cuts_events);
-        Self { recorded, by_counts, drift, clocks, odd }
+        Self { recorded, by_counts, clocks, odd }
     }
 
     /// The records after the last step that changed them.
     pub(crate) fn records(&self) -> &[Dataset] {
         let odd = self.odd.as_ref().map(|odd| &odd.records[..]);
-        let drift = self.drift.as_ref().map(|drift| &drift.records[..]);
         let by_counts = self.by_counts.as_ref().map(|error| &error.records[..]);
-        odd.or(self.clocks.records.as_deref()).or(drift).or(by_counts).unwrap_or(self.recorded)
+        odd.or(self.clocks.records.as_deref()).or(by_counts).unwrap_or(self.recorded)
     }
 
     /// Whether a clock was set right.
     pub(crate) fn has_clock(&self) -> bool {
-        self.drift.is_some() || !self.clocks.offsets.is_empty()
+        self.clocks.drift.is_some() || !self.clocks.offsets.is_empty()
     }
 
     /// Runs and intervals that do not belong.

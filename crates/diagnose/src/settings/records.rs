@@ -9,15 +9,6 @@ rules::settings! {
     /// Natural logarithm of odds. Cost of each mistake beyond the first that a fault of the records takes.
     /// Budgeted: ln 20, a second mistake in one of twenty robots that have a first.
     log_odds_of_a_mistake: f64 = 3.0,
-    /// Seconds. Offsets of clocks are sought up to this.
-    /// Convention: an instrument that is later than a second is another recording.
-    max_clock_offset_s: f64 = 1.0,
-    /// Seconds. Step of the offsets that are tried.
-    /// Budgeted: a parabola through three of them finds the best to a hundredth of a second.
-    clock_step_s: f64 = 0.04,
-    /// Seconds. A run's own clock is off by this at the least.
-    /// Budgeted: smaller offsets leave the fit sound, and compete with effects that resemble them.
-    min_clock_offset_s: f64 = 0.08,
     /// Seconds. An offset of all runs that is taken off before the fit.
     /// Budgeted: a tenth of a second and less is estimated with everything else.
     min_common_clock_offset_s: f64 = 0.15,
@@ -25,59 +16,9 @@ rules::settings! {
     /// for the offset to be estimated with everything else.
     /// Budgeted: three standard deviations of an offset that a few runs determine to five milliseconds.
     min_rejecting_clock_offset_s: f64 = 0.015,
-    /// Standard deviations. A run's own clock is off by as many of its estimate at the least.
-    /// Budgeted: errors of rounded turns are alike, and the estimate is less certain than it says.
-    min_clock_sigmas: f64 = 6.0,
-    /// Natural logarithm. Likelihood that an offset gains at the least.
-    /// Tuned: on 907 logs of seeds 63001 to 63003, where coarse counts of slow robots gain up to 26 with no
-    /// offset, and clocks that are off hundreds; of 486 logs of 67001 and 67002 two lose a false offset.
-    min_clock_gain: f64 = 40.0,
-    /// Fraction. Share of the turns and distances between poses that counts leave unexplained where their
-    /// clock is right; of counts that leave more, nothing is said.
-    /// Budgeted: swapped wheels leave four times what there
-    /// is.
-    max_clock_unexplained: f64 = 0.5,
-    /// Fraction. The same share above which poses are taken farther apart.
-    /// Budgeted: a tenth, so that errors of poses are a third of what lies between them.
-    clock_unexplained: f64 = 0.1,
-    /// Radians. Turns between poses below this, root mean square, are noise of headings.
-    /// Budgeted: ten times the noise of an ordinary instrument.
-    min_clock_turn_rad: f64 = 0.01,
-    /// Number. Fewer runs do not say which of them is the odd one.
-    /// Derived: of two, either is.
-    min_clock_runs: usize = 4,
-    /// Number. Of so many runs one may have a clock of its own; where more have, their errors are no clock's.
+    /// Number. Of so many runs one may have another mounting; where more have, it is their errors.
     /// Convention: one in ten.
-    min_runs_per_odd_clock: usize = 10,
-    /// Ratio to the fastest wheel of the run. A robot whose wheels are slower in the first row sets off
-    /// there, and one whose are in the last row comes to rest.
-    /// Budgeted: a row of 50 ms of a robot that takes half a second to its speed has a twentieth on average.
-    max_rate_at_rest: f64 = 0.1,
-    /// Number. Fewer pairs of poses do not say an offset.
-    /// Budgeted: three seconds at ten a second.
-    min_clock_pairs: usize = 30,
-    /// Number. Of more pairs of poses in a run, so many are taken.
-    /// Budgeted: a run takes a few milliseconds.
-    max_clock_pairs: usize = 600,
-    /// Number. A drift of the clocks is sought between so many parts of a long run.
-    /// Budgeted: a clock that is off by a hundredth is off by less than a second within one of ten minutes.
-    drift_parts_per_run: usize = 8,
-    /// Seconds. Runs of this length and more are long.
-    /// Budgeted: in a part of it are as many pairs of poses as an offset needs, at five a second.
-    min_drift_run_s: f64 = 60.0,
-    /// Number. Fewer parts do not say that an offset grows evenly.
-    /// Derived: through two goes a line, and of three one may be off.
-    min_drift_parts: usize = 4,
-    /// Number. Of more parts so many are taken.
-    /// Budgeted: two thousand lines go through pairs of them.
-    max_drift_parts: usize = 64,
-    /// Seconds a second. No clock drifts by more.
-    /// Convention: the upper end of what users report is 3 %.
-    max_clock_rate: f64 = 0.05,
-    /// Number. Times that a drift is set right, and what is left is sought again.
-    /// Budgeted: a line through the first half of a log leaves a third of the drift, and the next one a
-    /// hundredth.
-    max_drift_steps: usize = 4,
+    min_runs_per_odd_extrinsics: usize = 10,
     /// Relative. Prior standard deviation of the wheels' sizes.
     /// Convention: wheels are known to a few per cent.
     wheel_prior_sigma: f64 = 0.05,

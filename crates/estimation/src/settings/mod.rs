@@ -107,6 +107,9 @@ rules::settings! {
     /// is fitted.
     /// Budgeted: the fit of a latency from 0 ends at a smaller one (tests/command/bad_logs.rs).
     min_start_clock_s: f64 = 0.05,
+    /// m/√m. Noise of recorded speeds from which on its bias is taken off.
+    /// Budgeted: 1 mm/√m with poses of a millimetre ten times a second biases a separation by some 1e-4.
+    min_rate_noise: f64 = 1e-3,
     /// Sensor heading, radians, beyond which the extrinsics are free from the first fit on.
     /// Less may be an error of a short log.
     /// Tuned: by hand; no record of what on.
@@ -125,12 +128,6 @@ rules::settings! {
     /// Longest row within which the wheels' rates change steadily, seconds.
     /// Budgeted: robots speed up and stop in some tenths of a second; within a longer row they may do both.
     max_steady_row_s: f64 = 0.3,
-    /// Steps of an angle below this, radians, are rounding of the file's numbers and no counts.
-    /// Budgeted: files with six decimals round by half of 1e-6, and a step twice.
-    quantum_tolerance: f64 = 3e-6,
-    /// Counts of angles below this, radians, are as good as exact.
-    /// Budgeted: 200 000 counts a turn; on a wheel of 80 mm, 2.5 µm.
-    min_quantum_rad: f64 = 3e-5,
     /// What stamps jitter by, as a share of a row, up to which rates go by them.
     /// Budgeted: a rate over three rows is then off by 2 %.
     max_exact_jitter: f64 = 0.05,
@@ -142,12 +139,6 @@ rules::settings! {
     /// errs.
     /// Convention: that of the sampling period.
     min_beat_jitter: f64 = 0.02,
-    /// Steps that must be there before angles are taken for counts.
-    /// Budgeted: chance does not put 98 of 100 on a grid.
-    min_grid_steps: usize = 100,
-    /// Share of steps that are multiples of the smallest one, from which on angles are counts.
-    /// Budgeted: chance has a tenth of them within a twentieth.
-    min_grid_fraction: f64 = 0.98,
     /// Variance that rounding adds to a pose, over that of a measurement, from which on distributions of
     /// tests are found by simulation.
     /// Budgeted: below it, a statistic's variance is off by a twentieth of its excess at

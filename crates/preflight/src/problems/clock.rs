@@ -2,12 +2,13 @@
 //! wheels explain decisively better once it is undone.
 //! Reference: Knapp & Carter 1976 (time delay by maximum likelihood).
 
-use crate::alignment::{BestClock, Clock, Comparison, Explained};
+use crate::alignment::{BestClock, Comparison, Explained};
+use crate::clock::{Clock, ClockDrift, ClockSearch};
 use crate::kind::{Kind, MirroredAxis};
 use crate::problem::{Problem, Severity, probability};
 use crate::session_check::{Matched, SessionCheck};
 use crate::settings::CHECKS;
-use crate::windows::{Measured, Reading, windows};
+use crate::windows::{Measured, Reading, Window, windows};
 
 /// Readings that are tried, the sound one first.
 const READINGS: [Reading; 4] = [
@@ -51,30 +52,55 @@ pub(crate) fn matched(check: &mut SessionCheck) -> Option<Matched> {
 
 /// Says a rate and an offset that matter; the clock with them.
 fn said_clock(check: &mut SessionCheck, reading: Reading, as_is: Option<Explained>, best: BestClock) -> Clock {
-    let rated = rate(check, reading, best.clock);
-    if let Some((clock, gain)) = rated {
-        let severity = if clock.rate.abs() > CHECKS.max_clock_rate { Severity::Error } else { Severity::Warning };
-        check.problems.push(Problem::new(&Kind::ClockRate { rate: clock.rate }, severity, None, probability(gain)));
+    let drift = clock_drift(check, reading, best.clock);
+    if let Some(ClockDrift { clock, gain, at_ends_s, .. }) = drift {
+        // What a fit undoes is no error, unless no clock of a computer is off so far.
+        let is_far = clock.rate.abs() > CHECKS.max_clock_rate || at_ends_s > CHECKS.min_warned_offset_s;
+        let severity = if is_far && !clock.of_session { Severity::Error } else { Severity::Hint };
+        let kind = Kind::ClockRate { rate: clock.rate, of_session: clock.of_session };
+        check.problems.push(Problem::new(&kind, severity, None, probability(gain)));
         // What is left at the start of the records.
-        if clock.offset_s.abs() < 2.0 * CHECKS.min_warned_offset_s {
+        if clock.late_s(0.0).abs() < 2.0 * CHECKS.min_warned_offset_s {
             return clock;
         }
     }
-    let clock = rated.map_or(best.clock, |(clock, _)| clock);
+    let clock = drift.map_or(best.clock, |drift| drift.clock);
     match offset_gain(check, reading, as_is, clock, best.sigma_s) {
         Some(gain) => {
-            let offset_s = clock.offset_s / (1.0 + clock.rate);
+            let offset_s = clock.late_s(0.0);
             let severity = match offset_s.abs() {
                 large if large > CHECKS.max_fitted_offset_s => Severity::Error,
                 some if some > CHECKS.min_warned_offset_s => Severity::Warning,
                 _ => Severity::Hint,
             };
             let kind = Kind::ClockOffset { offset_s, sigma_s: best.sigma_s };
+            let apart = runs_apart(check, reading, clock);
+            if !apart.is_empty() {
+                // A fit leaves out what does not belong, and the others are sound.
+                let of_runs = Problem::new(&kind, severity.max(Severity::Warning), Some(apart), probability(gain));
+                check.problems.push(Problem { fix: None, ..of_runs });
+                return Clock::default();
+            }
             check.problems.push(Problem::new(&kind, severity, None, probability(gain)));
             clock
         }
-        None => rated.map_or(Clock::default(), |(clock, _)| clock),
+        None => drift.map_or(Clock::default(), |drift| drift.clock),
     }
+}
+
+/// The runs that a clock is of, where it is of no more than half of them and others are without it.
+fn runs_apart(check: &SessionCheck, reading: Reading, clock: Clock) -> Vec<String> {
+    let (windows, measured) = windows(&check.runs, reading, CHECKS.max_windows);
+    let gain = |run: usize| {
+        let own: Vec<Window> = windows.iter().filter(|window| window.run == run).copied().collect();
+        let of_run = Comparison { windows: &own, measured, runs: &check.runs, m_per_rad: check.m_per_rad() };
+        let [without, with] = [Clock::default(), clock].map(|clock| of_run.at(clock));
+        without.zip(with).map_or(0.0, |(without, with)| with.gain_over(&without))
+    };
+    let gains: Vec<f64> = (0..check.runs.len()).map(gain).collect();
+    let own: Vec<usize> = (0..gains.len()).filter(|run| gains[*run] > CHECKS.min_gain).collect();
+    let others = gains.iter().filter(|gain| **gain < -CHECKS.min_gain).count();
+    if others < own.len() { Vec::new() } else { own.iter().map(|run| check.runs[*run].id.clone()).collect() }
 }
 
 /// The reading that the wheels explain decisively better than the sound one.
@@ -135,16 +161,9 @@ pub(crate) fn offset_gain(
     (gain > CHECKS.min_gain && with.ratio_to(&now) < 0.5 * (1.0 + CHECKS.decisive_ratio)).then_some(gain)
 }
 
-/// A rate that matters, with what it gains.
-fn rate(check: &SessionCheck, reading: Reading, near: Clock) -> Option<(Clock, f64)> {
-    let (windows, measured) = windows(&check.runs, reading, CHECKS.max_windows / 2);
-    let comparison = Comparison { windows: &windows, measured, runs: &check.runs, m_per_rad: check.m_per_rad() };
-    let still = comparison.at(near)?;
-    let (rated, found) = comparison.best_rate(near)?;
-    let gain = found.gain_over(&still);
-    let is_explained = found.unexplained.iter().all(|share| *share < CHECKS.max_left_by_fix);
-    let matters = rated.rate.abs() > CHECKS.min_clock_rate && gain > CHECKS.min_gain && is_explained;
-    (matters && found.ratio_to(&still) < 0.5 * (1.0 + CHECKS.decisive_ratio)).then_some((rated, gain))
+/// A rate that matters, beside a clock of all runs.
+pub(crate) fn clock_drift(check: &SessionCheck, reading: Reading, near: Clock) -> Option<ClockDrift> {
+    ClockSearch::of_session(check, reading, near).drift(near, CHECKS.min_clock_offset_s)
 }
 
 /// Says how the instrument's records are to be read.

@@ -4,7 +4,7 @@
 use dataset::Dataset;
 use kinematics::{Side, wrap_to_pi};
 
-use crate::alignment::Clock;
+use crate::clock::model::Clock;
 use crate::problem::{Problem, Severity};
 use crate::record_fault::{RecordFault, WheelChange};
 use crate::run_log::RunLog;

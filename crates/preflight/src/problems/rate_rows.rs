@@ -1,12 +1,13 @@
-//! Rows of rates that say nothing of the wheels: zeros where no message came, and speeds that wrap at the end
-//! of their numbers. They are restored for the checks that follow. Rates that were recorded may have been
-//! read as the counts that they are made of: rows are examined as rates in any log.
+//! Rows of rates that say nothing of the wheels, or too little: zeros where no message came, speeds that wrap
+//! at the end of their numbers, and values that are cut to whole steps toward zero. They are restored for the
+//! checks that follow. Rates that were recorded may have been read as the counts that they are made of: rows
+//! are examined as rates in any log.
 
 use std::mem::take;
 
-use dataset::quantile;
+use dataset::{quantile, quantum_of_angles};
 
-use crate::alignment::Clock;
+use crate::clock::model::Clock;
 use crate::problem::{Problem, Severity, probability};
 use crate::record_fault::{Place, RecordFault};
 use crate::run_log::RunLog;
@@ -14,10 +15,11 @@ use crate::session_check::SessionCheck;
 use crate::settings::CHECKS;
 use crate::windows::Reading;
 
-/// Two columns of rates of each run; a row's are those of the interval that ends there.
+/// Two columns of each run, of rates or of increments; a row's are those of the interval that ends there.
 type Columns = [Vec<f64>; 2];
 
-pub(crate) fn found(check: &mut SessionCheck) {
+/// Whether rows are restored on average alone, so that parts of the log do not compare.
+pub(crate) fn found(check: &mut SessionCheck) -> bool {
     let m_per_rad = check.m_per_rad();
     // Speed and yaw rate, in metres of a wheel.
     let to_twist = |[left, right]: [f64; 2]| {
@@ -26,71 +28,112 @@ pub(crate) fn found(check: &mut SessionCheck) {
     };
     let to_wheels = |[v, by]: [f64; 2]| [(v - by) / m_per_rad.left, (v + by) / m_per_rad.right];
     let same = |rates: [f64; 2]| rates;
-    restore(check, zeros_filled, &same, &same, |rows, from, share, gain| {
+    restore(check, zeros_filled, (&same, &same, Of::Rates), |rows, from, share, Better { gain, .. }| {
         let severity = if share > CHECKS.max_rounded_share { Severity::Error } else { Severity::Warning };
         // What a robot cannot do so often needs little of an instrument.
         let is_certain = gain > CHECKS.min_gain || (rows >= CHECKS.min_rows && gain > 0.0);
         is_certain.then_some((RecordFault::ZeroRates { from, rows, share }, severity))
     });
-    let wraps = |rows: usize, from: Place, _: f64, gain: f64| {
+    let wraps = |rows: usize, from: Place, _: f64, Better { gain, .. }: Better| {
         (gain > CHECKS.min_gain).then_some((RecordFault::RatesWrap { from, rows }, Severity::Error))
     };
-    if !restore(check, unwrapped, &same, &same, wraps) {
-        restore(check, unwrapped, &to_twist, &to_wheels, wraps);
+    if !restore(check, unwrapped, (&same, &same, Of::Rates), wraps) {
+        restore(check, unwrapped, (&to_twist, &to_wheels, Of::Rates), wraps);
     }
+    // A counter loses nothing from row to row.
+    if check.runs.iter().all(|run| run.count_rad > 0.0) {
+        return false;
+    }
+    for of in [Of::Increments, Of::Rates] {
+        for (to, back) in [(&to_twist as Change<'_>, &to_wheels as Change<'_>), (&same, &same)] {
+            let is_cut = restore(check, with_halves, (to, back, of), |_, _, share, better| {
+                // Of values that are rounded to the nearest step, half of it may gain by chance.
+                let is_decisive = better.gain > CHECKS.min_gain && better.ratio < CHECKS.max_cut_ratio;
+                is_decisive.then_some((RecordFault::RatesCut { share }, Severity::Error))
+            });
+            if is_cut {
+                return true;
+            }
+        }
+    }
+    false
+}
+
+/// What is recorded of a row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Of {
+    Rates,
+    Increments,
+}
+
+impl Of {
+    /// What increments are divided by, over a row of so many seconds.
+    fn divisor(self, row_s: f64) -> f64 {
+        match self {
+            Self::Rates => row_s,
+            Self::Increments => 1.0,
+        }
+    }
+}
+
+/// By how many nats restored rows explain the motion better, and the ratio of what they leave of it.
+#[derive(Debug, Clone, Copy)]
+struct Better {
+    gain: f64,
+    ratio: f64,
 }
 
 /// From rates of both wheels to what was recorded, or back.
 type Change<'a> = &'a dyn Fn([f64; 2]) -> [f64; 2];
 
 /// Says what is wrong with rows, if the instrument's motion shows it, and restores them. Of the restored rows
-/// `say` is told their number, the first, their share of those in which the robot drives, and the nats by
-/// which the wheels then explain the motion better.
+/// `say` is told their number, the first, their share of those in which the robot drives, and by how much
+/// better the wheels then explain the motion.
 fn restore(
     check: &mut SessionCheck,
     restored: fn(&mut [Columns]) -> Vec<(usize, usize)>,
-    to: Change<'_>,
-    back: Change<'_>,
-    say: impl Fn(usize, Place, f64, f64) -> Option<(RecordFault, Severity)>,
+    recorded: (Change<'_>, Change<'_>, Of),
+    say: impl Fn(usize, Place, f64, Better) -> Option<(RecordFault, Severity)>,
 ) -> bool {
-    let mut columns: Vec<Columns> = check.runs.iter().map(|run| rates(run, to)).collect();
+    let (to, back, of) = recorded;
+    let mut columns: Vec<Columns> = check.runs.iter().map(|run| columns_of(run, to, of)).collect();
     let rows = restored(&mut columns);
     let Some(&(run, row)) = rows.first() else { return false };
     let sound = take(&mut check.runs);
-    check.runs = sound.iter().zip(&columns).map(|(run, columns)| with_rates(run, columns, back)).collect();
+    check.runs = sound.iter().zip(&columns).map(|(run, columns)| with_columns(run, columns, back, of)).collect();
     let then = check.explained(Reading::AS_IS, Clock::default());
     let restored = std::mem::replace(&mut check.runs, sound);
-    let gain = match (check.explained(Reading::AS_IS, Clock::default()), then) {
-        (Some(as_is), Some(then)) => then.gain_over(&as_is),
+    let better = match (check.explained(Reading::AS_IS, Clock::default()), then) {
+        (Some(as_is), Some(then)) => Better { gain: then.gain_over(&as_is), ratio: then.ratio_to(&as_is) },
         _ => return false,
     };
     let drives = columns.iter().map(|[a, b]| a.iter().zip(b).filter(|(a, b)| **a != 0.0 || **b != 0.0).count());
     let share = rows.len() as f64 / drives.sum::<usize>().max(1) as f64;
     // A row's rates are of the interval that ends there, and the first row has none.
-    let of = &check.runs[run];
-    let from = Place { run: of.id.clone(), t_s: of.t_s[row + 1], row: row + 2 };
-    let Some((kind, severity)) = say(rows.len(), from, share, gain) else { return false };
-    check.problems.push(Problem::record(kind, severity, None, probability(gain.max(CHECKS.min_gain))));
+    let first = &check.runs[run];
+    let from = Place { run: first.id.clone(), t_s: first.t_s[row + 1], row: row + 2 };
+    let Some((kind, severity)) = say(rows.len(), from, share, better) else { return false };
+    check.problems.push(Problem::record(kind, severity, None, probability(better.gain.max(CHECKS.min_gain))));
     check.runs = restored;
     true
 }
 
-fn rates(run: &RunLog, to: Change<'_>) -> Columns {
+fn columns_of(run: &RunLog, to: Change<'_>, of: Of) -> Columns {
     let both = |row: usize| {
-        let row_s = run.t_s[row + 1] - run.t_s[row];
-        to([&run.wheels.left, &run.wheels.right].map(|angles| (angles[row + 1] - angles[row]) / row_s))
+        let divisor = of.divisor(run.t_s[row + 1] - run.t_s[row]);
+        to([&run.wheels.left, &run.wheels.right].map(|angles| (angles[row + 1] - angles[row]) / divisor))
     };
     let rows: Vec<[f64; 2]> = (0..run.t_s.len().saturating_sub(1)).map(both).collect();
     [0, 1].map(|number| rows.iter().map(|of| of[number]).collect())
 }
 
-fn with_rates(run: &RunLog, columns: &Columns, back: Change<'_>) -> RunLog {
+fn with_columns(run: &RunLog, columns: &Columns, back: Change<'_>, of: Of) -> RunLog {
     let mut run = run.clone();
     for (row, (first, second)) in columns[0].iter().zip(&columns[1]).enumerate() {
-        let row_s = run.t_s[row + 1] - run.t_s[row];
+        let times = of.divisor(run.t_s[row + 1] - run.t_s[row]);
         let [left, right] = back([*first, *second]);
-        run.wheels.left[row + 1] = run.wheels.left[row] + left * row_s;
-        run.wheels.right[row + 1] = run.wheels.right[row] + right * row_s;
+        run.wheels.left[row + 1] = run.wheels.left[row] + left * times;
+        run.wheels.right[row + 1] = run.wheels.right[row] + right * times;
     }
     run
 }
@@ -132,6 +175,30 @@ fn zeros_filled(runs: &mut [Columns]) -> Vec<(usize, usize)> {
         }
     }
     filled
+}
+
+/// Adds the half of a step to values that are whole ones, away from zero: what is cut from them on average.
+/// The rows that gain by it.
+fn with_halves(runs: &mut [Columns]) -> Vec<(usize, usize)> {
+    let mut rows = Vec::new();
+    for number in 0..2 {
+        let first = || runs.iter().flat_map(|columns| &columns[number]).filter(|of| **of != 0.0).take(CHECKS.step_rows);
+        let sums = first().scan(0.0, |sum, value| {
+            *sum += value;
+            Some(*sum)
+        });
+        let step = quantum_of_angles(&sums.collect::<Vec<f64>>());
+        let mean = first().map(|value| value.abs()).sum::<f64>() / first().count() as f64;
+        for (run, columns) in runs.iter_mut().enumerate().filter(|_| step > CHECKS.min_cut_share * mean) {
+            for (row, value) in columns[number].iter_mut().enumerate().filter(|(_, value)| **value != 0.0) {
+                *value += 0.5 * step.copysign(*value);
+                rows.push((run, row));
+            }
+        }
+    }
+    rows.sort_unstable();
+    rows.dedup();
+    rows
 }
 
 /// Goes on beyond the ends of a symmetric range where a column leaps from near one end to near the other;

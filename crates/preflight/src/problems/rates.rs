@@ -2,7 +2,8 @@
 
 use dataset::Dataset;
 
-use crate::alignment::{Clock, Comparison};
+use crate::alignment::Comparison;
+use crate::clock::model::Clock;
 use crate::kind::Kind;
 use crate::problem::{Problem, Severity, probability};
 use crate::run_log::RunLog;

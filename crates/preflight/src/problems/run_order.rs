@@ -1,6 +1,7 @@
 //! Runs of the truth that are those of other runs of the log.
 
-use crate::alignment::{Clock, Comparison, Explained};
+use crate::alignment::{Comparison, Explained};
+use crate::clock::model::Clock;
 use crate::problem::{Problem, Severity, probability};
 use crate::problems::clock::is_decisive;
 use crate::record_fault::RecordFault;

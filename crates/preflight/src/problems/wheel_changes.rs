@@ -5,7 +5,8 @@ use std::ops::Range;
 
 use kinematics::{Side, Wheels};
 
-use crate::alignment::{Clock, Paired, explain};
+use crate::alignment::{Paired, explain};
+use crate::clock::model::Clock;
 use crate::gain_change::{GainChange, gain_change};
 use crate::geometry_estimate::GeometryEstimate;
 use crate::problem::{Problem, Severity, probability};
@@ -34,7 +35,10 @@ pub(crate) fn found(check: &mut SessionCheck, reading: Reading, clock: Clock) ->
     let Some((mut change, sides)) = found else { return false };
     let is_known = part_at_fault(&mut change, &sides, &pairs, check.m_per_rad());
     let Range { start, end } = change.span;
-    let place = |pair: &Paired, stamp_s: f64| Place::at(&check.runs[pair.window.run], clock.log_s(stamp_s));
+    let place = |pair: &Paired, stamp_s: f64| {
+        let run = &check.runs[pair.window.run];
+        Place::at(run, clock.log_s(run.start_s, stamp_s))
+    };
     let from = (start > 0).then(|| place(&pairs[start], pairs[start].window.from_s));
     let until = (end < pairs.len()).then(|| place(&pairs[end - 1], pairs[end - 1].window.to_s));
     let mut runs: Vec<String> = pairs[start..end].iter().map(|pair| check.runs[pair.window.run].id.clone()).collect();
@@ -56,8 +60,8 @@ fn cut(check: &mut SessionCheck, pairs: &[Paired], span: Range<usize>, clock: Cl
             continue;
         }
         match (from > own.start, to < own.end) {
-            (true, _) => run.keep(f64::NEG_INFINITY, clock.log_s(pairs[from].window.from_s)),
-            (false, true) => run.keep(clock.log_s(pairs[to - 1].window.to_s), f64::INFINITY),
+            (true, _) => run.keep(f64::NEG_INFINITY, clock.log_s(run.start_s, pairs[from].window.from_s)),
+            (false, true) => run.keep(clock.log_s(run.start_s, pairs[to - 1].window.to_s), f64::INFINITY),
             (false, false) => run.keep(f64::INFINITY, f64::INFINITY),
         }
     }

@@ -298,7 +298,8 @@ fn a_ratio_of_the_geometry_is_the_effect_that_changes_it() {
 
 #[test]
 fn a_clock_that_was_taken_off_is_added_to_what_is_found_of_all_runs() {
-    let offset = |runs: Option<Vec<String>>| ClockOffset { runs, offset_s: 0.3, sigma_s: 0.01, gain: 12.0 };
+    let of = preflight::ClockOffset { offset_s: 0.3, sigma_s: 0.01, gain: 12.0 };
+    let offset = |runs: Option<Vec<String>>| ClockOffset { runs, of };
     let of_all = of_clock(&offset(None), &[]);
     assert_eq!(of_all.causes, [Cause::Effect("truth_latency")]);
     assert_eq!((of_all.parameters["delay_s"].value, of_all.parameters["delay_s"].sigma), (0.3, Some(0.01)));

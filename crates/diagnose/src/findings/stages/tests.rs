@@ -67,7 +67,8 @@ fn fault(id: &'static str) -> Fault {
 fn a_clock_of_all_runs_joins_what_was_found_of_it_and_that_of_a_run_does_not() {
     let datasets = [session(0, 0.0)];
     let structure = structure(&datasets, &[]);
-    let offset = |runs| ClockOffset { runs, offset_s: 0.3, sigma_s: 0.01, gain: 30.0 };
+    let of = preflight::ClockOffset { offset_s: 0.3, sigma_s: 0.01, gain: 30.0 };
+    let offset = |runs| ClockOffset { runs, of };
     let of_all = [offset(None)];
     let late = finding::of_clock(&of_all[0], &[]);
     let results_of = |offsets: &[ClockOffset], before: Vec<Finding>| {
@@ -115,7 +116,8 @@ fn scatter_is_of_effects_without_sizes() {
 fn a_drift_takes_its_remainder_and_one_without_a_name_takes_nothing() {
     let datasets = [session(0, 0.0)];
     let structure = structure(&datasets, &[]);
-    let drift = ClockDrift { rate: 4e-3, sigma: 1e-5, of_session: false, gain: 50.0 };
+    let clock = preflight::Clock { rate: -4e-3, ..preflight::Clock::default() };
+    let drift = ClockDrift { clock, sigma: 1e-5, gain: 50.0, at_ends_s: 0.2 };
     let of = |without: &[String], causes: Vec<Cause>| {
         let before = Finding { causes, ..mean("slip_speed", 9.0) };
         let results = StageResults { drift: Some(&drift), without, ..results(&datasets, &structure) };

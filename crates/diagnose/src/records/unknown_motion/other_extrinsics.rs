@@ -73,7 +73,7 @@ pub(super) fn other_extrinsics(
             .filter(|(_, off, z)| off.abs() > least && *z > RECORDS.min_other_extrinsics_sigmas)
             .collect();
         // Where many runs are odd, none is.
-        if odd.len() > (of.len() / RECORDS.min_runs_per_odd_clock).max(1) {
+        if odd.len() > (of.len() / RECORDS.min_runs_per_odd_extrinsics).max(1) {
             continue;
         }
         for (track, off, sigmas) in odd {

@@ -1,35 +1,28 @@
 //! Clocks of instrument and robot that drift so far apart that one offset does not hold.
 //!
-//! Each short run, and each part of a long one, has a profile likelihood of its offset
-//! ([`crate::records::clock_profile`]). Where the offset is proportional to the time since each run's start,
-//! or since the session's, a line goes through these offsets. A part that lies off the line costs no more
-//! than a cap: its offset may be beyond the range of the profiles. The line is taken off the measurements'
-//! times, and the next one is fitted to what is left, until nothing is left. What the model fit finds of the
-//! rate later is added. Reference: Fischler & Bolles 1981 (RANSAC: lines through pairs, judged by all parts).
+//! Each short run, and each part of a long one, has a profile likelihood of its offset ([`super::profile`]).
+//! Where the offset is proportional to the time since each run's start, or since the session's, a line goes
+//! through these offsets. A part that lies off the line costs no more than a cap: its offset may be beyond
+//! the range of the profiles. The offsets are found anew beside a clock of this rate, and the next line is
+//! fitted to what is left, until nothing is left. Reference: Fischler & Bolles 1981 (RANSAC: lines through
+//! pairs, judged by all parts).
 
-use dataset::Dataset;
+use crate::clock::model::Clock;
+use crate::clock::profile::{Profile, RunClock};
+use crate::clock::search::ClockSearch;
+use crate::settings::CLOCKS;
 
-use crate::records::clock_profile::{Profile, RunClock};
-use crate::settings::RECORDS;
-
-/// A drift of the robot's clock against the instrument's, in all runs.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct ClockDrift {
-    /// What the robot's clock gains, seconds a second, and its standard deviation.
-    pub(crate) rate: f64,
-    pub(crate) sigma: f64,
-    /// The clocks agreed when the session began, and not at the start of each run.
-    pub(crate) of_session: bool,
+/// A clock that drifts against that of the log, in all runs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ClockDrift {
+    /// The clock, with the rate and the offset at the start.
+    pub clock: Clock,
+    /// Standard deviation of the rate, seconds a second.
+    pub sigma: f64,
     /// Log likelihood over that of one offset.
-    pub(crate) gain: f64,
-}
-
-/// A drift, and the records without it.
-pub(crate) struct DriftFound {
-    pub(crate) drift: ClockDrift,
-    pub(crate) records: Vec<Dataset>,
-    /// The clocks of their runs.
-    pub(crate) clocks: Vec<RunClock>,
+    pub gain: f64,
+    /// By how much the offset differs from its mean at the first and the last measurement, seconds.
+    pub at_ends_s: f64,
 }
 
 /// A part of a run: its time on the clock asked for, seconds, and its profile.
@@ -57,26 +50,38 @@ impl Line {
     }
 }
 
-/// Looks for a drift by which the offset is so far from its mean at the ends at the least.
-pub(crate) fn clock_drift(datasets: &[Dataset], clocks: &[RunClock], min_offset_s: f64) -> Option<DriftFound> {
-    // In a single run both are one, and the last of equals is taken: the run's.
-    let lines =
-        [true, false].map(|of_session| Some((of_session, drift_of(&parts_of(clocks, of_session), min_offset_s)?)));
-    let (of_session, (first, mut gain)) = lines.into_iter().flatten().max_by(|a, b| a.1.1.total_cmp(&b.1.1))?;
-    let mut records = datasets.to_vec();
-    let (mut slope, mut time_scale, mut steps) = (first.slope, 1.0, 0);
-    loop {
-        correct_times(&mut records, slope, of_session);
-        time_scale *= 1.0 - slope;
-        let clocks = RunClock::of_all(&records);
-        let parts = parts_of(&clocks, of_session);
-        let (line, sigma) = line_of(&parts)?;
-        gain += gain_of(&parts, line);
-        (slope, steps) = (line.slope, steps + 1);
-        if steps == RECORDS.max_drift_steps || (slope * span_s(&parts)).abs() < 0.1 * RECORDS.clock_step_s {
-            let drift = ClockDrift { rate: time_scale - 1.0, sigma, of_session, gain };
-            return Some(DriftFound { drift, records, clocks });
+impl ClockSearch<'_> {
+    /// Looks for a drift beside a clock, by which the offset is so far from its mean at the ends at the
+    /// least.
+    #[must_use]
+    pub fn drift(&self, near: Clock, min_offset_s: f64) -> Option<ClockDrift> {
+        let first = self.profiles(near);
+        // In a single run both are one, and the last of equals is taken: the run's.
+        let lines = [true, false].map(|of_session| {
+            // Through two or three clocks that were set one by one a line may go by chance.
+            if of_session && (2..CLOCKS.min_drift_parts).contains(&first.len()) {
+                return None;
+            }
+            let parts = parts_of(&first, of_session);
+            Some((of_session, span_s(&parts), drift_of(&parts, min_offset_s)?))
+        });
+        let of_all = lines.into_iter().flatten().max_by(|a, b| a.2.1.total_cmp(&b.2.1))?;
+        let (of_session, [first_s, last_s], (mut line, mut gain)) = of_all;
+        let (middle_s, span_s) = (0.5 * (first_s + last_s), last_s - first_s);
+        let mut clock = Clock { of_session, middle_s, ..near };
+        for steps in 1.. {
+            clock.offset_s += line.at_start_s + line.slope * middle_s;
+            clock.rate = (1.0 + clock.rate) / (1.0 - line.slope) - 1.0;
+            let found = self.profiles(clock);
+            let parts = parts_of(&found, of_session);
+            let (next, sigma) = line_of(&parts)?;
+            gain += gain_of(&parts, next);
+            line = next;
+            if steps == CLOCKS.max_drift_steps || (line.slope * span_s).abs() < 0.1 * CLOCKS.step_s {
+                return Some(ClockDrift { clock, sigma, gain, at_ends_s: 0.5 * (clock.rate * span_s).abs() });
+            }
         }
+        None
     }
 }
 
@@ -88,20 +93,20 @@ fn parts_of(clocks: &[RunClock], of_session: bool) -> Vec<Part<'_>> {
         .flat_map(|clock| clock.parts.iter().map(move |(run_s, profile)| (clock, run_s, profile)))
         .map(|(clock, run_s, profile)| Part { since_s: of_run(clock) + run_s, profile })
         .collect();
-    let every = all.len().div_ceil(RECORDS.max_drift_parts).max(1);
+    let every = all.len().div_ceil(CLOCKS.max_drift_parts).max(1);
     all.into_iter().step_by(every).collect()
 }
 
 /// A line that explains parts better than any one offset, and by how much.
 fn drift_of(parts: &[Part<'_>], min_offset_s: f64) -> Option<(Line, f64)> {
-    if parts.len() < RECORDS.min_drift_parts {
+    if parts.len() < CLOCKS.min_drift_parts {
         return None;
     }
     let (line, _) = line_of(parts)?;
     let gain = gain_of(parts, line);
-    let at_ends_s = 0.5 * (line.slope * span_s(parts)).abs();
-    (gain > RECORDS.min_clock_gain && at_ends_s >= min_offset_s && line.slope.abs() <= RECORDS.max_clock_rate)
-        .then_some((line, gain))
+    let [first_s, last_s] = span_s(parts);
+    let at_ends_s = 0.5 * (line.slope * (last_s - first_s)).abs();
+    (gain > CLOCKS.min_gain && at_ends_s >= min_offset_s && line.slope.abs() <= CLOCKS.max_rate).then_some((line, gain))
 }
 
 /// Log likelihood of a line over that of the best of the parts' own offsets for all.
@@ -137,31 +142,23 @@ fn line_of(parts: &[Part<'_>]) -> Option<(Line, f64)> {
 /// offset is uncertain by up to what makes another clock, and by a cap beyond that.
 fn cost(parts: &[Part<'_>], line: Line) -> f64 {
     let of = |part: &Part<'_>| {
-        let most = RECORDS.min_clock_gain * line.residual(part).powi(2).min(1.0);
+        let most = CLOCKS.min_gain * line.residual(part).powi(2).min(1.0);
         part.profile.gain_over(line.at(part)).min(most)
     };
     parts.iter().map(of).sum()
 }
 
-fn span_s(parts: &[Part<'_>]) -> f64 {
+/// The times of the first and of the last part.
+fn span_s(parts: &[Part<'_>]) -> [f64; 2] {
     let since = parts.iter().map(|part| part.since_s);
-    let [first, last] = since.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], s| [a.min(s), b.max(s)]);
-    last - first
-}
-
-/// Takes an offset that grows with this slope off the measurements' times.
-fn correct_times(records: &mut [Dataset], slope: f64, of_session: bool) {
-    for run in records.iter_mut().flat_map(|dataset| &mut dataset.runs) {
-        let start_s = if of_session { run.info.start_s.unwrap_or(0.0) } else { 0.0 };
-        run.truth.iter_mut().for_each(|sample| sample.t_s -= slope * (start_s + sample.t_s));
-    }
+    since.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], s| [a.min(s), b.max(s)])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::records::clock_profile::tests::driven;
-    use crate::settings::RECORDS;
+    use crate::clock::driven_runs::driven;
+    use dataset::Dataset;
 
     /// Runs every so many seconds, whose poses are of so long before their stamps.
     fn every(seconds: f64, offsets_s: &[f64]) -> [Dataset; 1] {
@@ -172,26 +169,26 @@ mod tests {
         [dataset]
     }
 
-    fn sought(datasets: &[Dataset]) -> Option<DriftFound> {
-        clock_drift(datasets, &RunClock::of_all(datasets), RECORDS.min_common_clock_offset_s)
+    fn sought(offsets_s: &[f64], near: Clock) -> Option<ClockDrift> {
+        ClockSearch::of(&every(100.0, offsets_s), |_| true).drift(near, 0.15)
     }
 
     #[test]
-    fn an_offset_that_grows_from_run_to_run_is_a_clock_that_loses() {
+    fn an_offset_that_grows_from_run_to_run_is_a_clock_that_gains() {
         let offsets_s = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6];
-        let DriftFound { drift, records, .. } = sought(&every(100.0, &offsets_s)).expect("it drifts");
+        let found = sought(&offsets_s, Clock::default()).expect("it drifts");
+        let ClockDrift { clock, sigma, gain, at_ends_s } = found;
         // A millisecond a second. Poses are taken at hundredths of a second, over ten minutes.
-        assert!(drift.of_session && (drift.rate + 1e-3).abs() < 2e-5, "{drift:?}");
-        assert!(drift.sigma > 0.0 && drift.sigma < 5e-5 && drift.gain > RECORDS.min_clock_gain, "{drift:?}");
-        assert!(sought(&records).is_none(), "nothing is left");
+        assert!(clock.of_session && (clock.rate - 1e-3).abs() < 2e-5, "{found:?}");
+        assert!(sigma > 0.0 && sigma < 5e-5 && gain > CLOCKS.min_gain && (at_ends_s - 0.3).abs() < 0.02, "{found:?}");
+        assert!(sought(&offsets_s, clock).is_none(), "nothing is left");
         // Of the last run's stamps 0.6 s are taken, and a thousandth of its own.
-        let last = |all: &[Dataset]| all[0].runs[6].truth[100].t_s;
-        assert!((last(&records) - (last(&every(100.0, &offsets_s)) - 0.61)).abs() < 0.02);
+        assert!((10.0 - clock.log_s(600.0, 10.0) - 0.61).abs() < 0.02);
     }
 
     #[test]
     fn one_clock_for_all_an_odd_run_and_what_the_fit_takes_are_no_drift() {
-        let drifts = |offsets_s: &[f64]| sought(&every(100.0, offsets_s)).is_some();
+        let drifts = |offsets_s: &[f64]| sought(offsets_s, Clock::default()).is_some();
         assert!(!drifts(&[0.3; 7]) && !drifts(&[0.0, 0.0, 0.0, 0.4, 0.0, 0.0, 0.0]));
         assert!(!drifts(&[0.0, 0.04, 0.08, 0.12, 0.16, 0.2, 0.24]), "0.12 s from its mean at the ends");
         assert!(!drifts(&[0.0, 0.3, 0.6]), "through three runs a line may go by chance");
@@ -201,7 +198,7 @@ mod tests {
     fn runs_beyond_what_is_sought_do_not_hide_the_line_through_the_others() {
         // Of the last ones the offset is beyond a second, until the line is taken off.
         let offsets_s = [0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75];
-        let DriftFound { drift, .. } = sought(&every(100.0, &offsets_s)).expect("it drifts");
-        assert!((drift.rate + 2.5e-3).abs() < 3e-5, "{drift:?}");
+        let found = sought(&offsets_s, Clock::default()).expect("it drifts");
+        assert!((found.clock.rate - 2.5e-3).abs() < 3e-5, "{found:?}");
     }
 }

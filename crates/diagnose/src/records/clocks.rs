@@ -1,0 +1,73 @@
+//! Clocks of instrument and robot that are far apart, or drift: of all runs, or of one among many
+//! ([`preflight::ClockSearch`]).
+//!
+//! Before anything is fitted, a drift and an offset of all runs are taken off the measurements' times. A run
+//! with an offset of its own is left out: it would be explained by whatever term it pays best.
+
+use dataset::Dataset;
+use preflight::{Clock, ClockSearch};
+use rules::Rule;
+
+use crate::records::log_rows::has_outlying_rows;
+use crate::records::names::run_name;
+
+/// An offset of the instrument's clock: its poses are of so long before their stamps.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ClockOffset {
+    /// Ids of the runs, where it is not of all.
+    pub(crate) runs: Option<Vec<String>>,
+    /// The offset, with what it gains.
+    pub(crate) of: preflight::ClockOffset,
+}
+
+/// What was found, and the records without it.
+#[derive(Default)]
+pub(crate) struct Clocks {
+    /// A drift of all clocks.
+    pub(crate) drift: Option<preflight::ClockDrift>,
+    /// Offsets beside it.
+    pub(crate) offsets: Vec<ClockOffset>,
+    /// Where there is a drift or an offset.
+    pub(crate) records: Option<Vec<Dataset>>,
+    /// The offset that all runs have still, seconds: small enough for the fit to estimate.
+    pub(crate) remaining_s: f64,
+}
+
+impl Clocks {
+    /// Looks for them; an offset of all runs, or one at the ends of a drift, counts from `min_common_s` on.
+    pub(crate) fn of(datasets: &[Dataset], min_common_s: f64) -> Self {
+        let search = ClockSearch::of(datasets, |run| !has_outlying_rows(run));
+        let drift = Rule::ClockDrift.finds(search.drift(Clock::default(), min_common_s));
+        let mut clock =
+            Clock { offset_s: 0.0, middle_s: 0.0, ..drift.map_or_else(Clock::default, |drift| drift.clock) };
+        let (mut offsets, mut remaining_s, mut odd) = (Vec::new(), 0.0, Vec::new());
+        if let Some(found) = search.offsets(clock) {
+            let is_common = found.common.offset_s.abs() >= min_common_s && found.common.is_certain();
+            if (is_common || !found.odd.is_empty()) && Rule::ClockOffsets.applies(true) {
+                let own = |&((session, run), of): &((usize, usize), preflight::ClockOffset)| ClockOffset {
+                    runs: Some(vec![run_name(datasets, session, run)]),
+                    of,
+                };
+                offsets.extend(found.odd.iter().map(own));
+                offsets.extend(is_common.then_some(ClockOffset { runs: None, of: found.common }));
+                odd.extend(found.odd.iter().map(|(run, _)| *run));
+            }
+            match offsets.last() {
+                Some(ClockOffset { runs: None, of }) => clock.offset_s = of.offset_s,
+                _ => remaining_s = found.common.offset_s,
+            }
+        }
+        if clock == Clock::default() && odd.is_empty() {
+            return Self { remaining_s, ..Self::default() };
+        }
+        let mut records = datasets.to_vec();
+        for run in records.iter_mut().flat_map(|dataset| &mut dataset.runs) {
+            let start_s = run.info.start_s.unwrap_or(0.0);
+            run.truth.iter_mut().for_each(|sample| sample.t_s = clock.log_s(start_s, sample.t_s));
+        }
+        for (session, run) in odd.iter().rev() {
+            records[*session].runs.remove(*run);
+        }
+        Self { drift, offsets, records: Some(records), remaining_s }
+    }
+}

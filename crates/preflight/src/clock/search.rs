@@ -1,0 +1,54 @@
+//! The search for clocks in the runs of one or several sessions.
+
+use std::borrow::Cow;
+
+use dataset::{Dataset, Run};
+use rayon::prelude::*;
+
+use crate::clock::model::Clock;
+use crate::clock::profile::RunClock;
+use crate::clock::searched_run::SearchedRun;
+use crate::run_log::{RunLog, m_per_rad};
+use crate::session_check::SessionCheck;
+use crate::windows::Reading;
+
+/// Runs whose clocks are compared.
+pub struct ClockSearch<'r> {
+    pub(super) runs: Vec<SearchedRun<'r>>,
+}
+
+impl ClockSearch<'static> {
+    /// The runs of all sessions that are to be asked, by the stated drives.
+    #[must_use]
+    pub fn of(datasets: &[Dataset], is_asked: impl Fn(&Run) -> bool + Sync) -> Self {
+        let of_session = |(session, dataset): (usize, &Dataset)| {
+            let SessionCheck { runs, robot, .. } = SessionCheck::new(&dataset.session());
+            let asked = |log: RunLog| {
+                let run = dataset.runs.iter().position(|run| run.info.id == log.id)?;
+                let drive = (m_per_rad(&robot), robot.wheel_separation_m);
+                is_asked(&dataset.runs[run])
+                    .then(|| SearchedRun::of((session, run), Cow::Owned(log), Reading::AS_IS, drive))
+            };
+            runs.into_iter().filter_map(asked).collect::<Vec<_>>()
+        };
+        Self { runs: datasets.par_iter().enumerate().flat_map(of_session).collect() }
+    }
+}
+
+impl<'r> ClockSearch<'r> {
+    /// One session by the drive that its windows show, if they do.
+    pub(crate) fn of_session(check: &'r SessionCheck, reading: Reading, clock: Clock) -> Self {
+        let shown = check.matched_at(reading, clock).and_then(|matched| matched.geometry);
+        let drive = match shown.filter(|found| !found.is_diluted) {
+            Some(found) => (found.m_per_rad, found.separation_m),
+            None => (check.m_per_rad(), check.robot.wheel_separation_m),
+        };
+        let of = |(run, log): (usize, &'r RunLog)| SearchedRun::of((0, run), Cow::Borrowed(log), reading, drive);
+        Self { runs: check.runs.iter().enumerate().map(of).collect() }
+    }
+
+    /// What the runs say of their clocks beside one of all.
+    pub(super) fn profiles(&self, clock: Clock) -> Vec<RunClock> {
+        self.runs.par_iter().filter_map(|run| RunClock::of(run, clock)).collect()
+    }
+}
