@@ -43,7 +43,8 @@ impl StartValues {
         let clock = best_clock(&check, Reading::AS_IS, as_is)
             .filter(|best| offset_gain(&check, Reading::AS_IS, as_is, best.clock, best.sigma_s).is_some())
             .map(|best| best.clock);
-        let drift = clock_drift(&check, Reading::AS_IS, clock.unwrap_or_default());
+        let drift =
+            clock_drift(&check, Reading::AS_IS, clock.unwrap_or_default()).filter(|drift| drift.clock.of_session);
         let clock_offset_s = clock.map(|clock| clock.offset_s);
         let clock = drift.map(|drift| drift.clock).or(clock);
         let drive = check.matched_at(Reading::AS_IS, clock.unwrap_or_default()).and_then(|matched| {
