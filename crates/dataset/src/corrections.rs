@@ -219,6 +219,15 @@ mod tests {
     }
 
     #[test]
+    fn a_clock_that_gains_counts_from_the_start_of_the_session() {
+        let mut run = run();
+        run.info.start_s = Some(600.0);
+        Corrections { truth_clock_rate: 0.1, ..Corrections::default() }.apply(&mut run);
+        // 1100 s of the instrument are 1000 s of the log, of which 600 went before.
+        assert!((run.truth[0].t_s - 400.0).abs() < 1e-9, "{}", run.truth[0].t_s);
+    }
+
+    #[test]
     fn rates_of_the_instant_become_those_of_the_interval_that_ends_there() {
         let mut run = run();
         run.odometry.wheels = WheelLog::Twist { v_mps: vec![1.0, 3.0], omega_radps: vec![0.0, 0.5] };

@@ -4,8 +4,9 @@
 //! of the robot, so that a fit explains less of a turn by each, and the separation comes out too large
 //! (errors in variables; Fuller 1987). With the noise added once more, drawn and with either sign, the
 //! estimates move by what they are off already (simulation and extrapolation; Cook & Stefanski 1994). The
-//! noise is that of the speeds' second differences, of which steady motion has none, and no more than a fit
-//! finds of the wheels': a wheel that slips is seen by the instrument, and biases nothing.
+//! variance of the noise is a sixth of the mean square of the speeds' second differences; steady motion has
+//! none. It is at most the variance of the fit's wheel noise. Slip is no such noise: the instrument sees it,
+//! and it biases nothing.
 
 use std::sync::Arc;
 

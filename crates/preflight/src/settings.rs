@@ -145,10 +145,9 @@ rules::settings! {
     /// Share of the windows that must lie within both records at an offset that is looked at.
     /// Budgeted: a match of half of the records is no accident of one manoeuvre.
     min_overlap: f64 = 0.5,
-    /// Relative. Clock rate from which on a log says something else than it means; a smaller one is undone.
-    /// Tuned: on the fourteen sessions of OptiOdom, whose clocks gain up to 2.8e-3 within runs; a clock that
-    /// counts ticks of another length is off by per cents.
-    max_clock_rate: f64 = 3e-3,
+    /// Relative. Clock rate from which on no result is right.
+    /// Budgeted: wheels at a steady speed are off by as much, ten times what calibrations promise.
+    max_clock_rate: f64 = 5e-4,
     /// Ratio to the stated value, or its inverse, that calibration corrects; beyond, the log says something
     /// else than it means.
     /// Convention: wheels are known to a few per cent; `calib` remarks on the same ratio.

@@ -299,19 +299,16 @@ fn mean_clock_s(fit: &ModelFit<'_>) -> f64 {
     clocks.iter().map(|clock| clock.offset_s).sum::<f64>() / clocks.len().max(1) as f64
 }
 
-/// Clocks that run at other rates, which were undone before the fit.
-fn clock_rates<'n>(fit: &ModelFit<'_>, names: &'n [&str]) -> impl Iterator<Item = String> + use<'n> {
-    let rates: Vec<Clock> = fit.records.clocks.clone();
-    let of = |(clock, name): (Clock, &&str)| {
-        let (way, since) =
-            (if clock.rate > 0.0 { "gains" } else { "loses" }, if clock.of_session { "session" } else { "run" });
-        let ppm = 1e6 * clock.rate.abs();
+/// Clocks that drift over their session, which was undone before the fit.
+fn clock_rates(fit: &ModelFit<'_>, names: &[&str]) -> Vec<String> {
+    let of = |(clock, name): (&Clock, &&str)| {
+        let (way, ppm) = (if clock.rate > 0.0 { "gains" } else { "loses" }, 1e6 * clock.rate.abs());
         let sentence = format!(
-            "{name}: the instrument's clock {way} {ppm:.0} ppm on the log's from the start of the {since} on, which is undone"
+            "{name}: the instrument's clock {way} {ppm:.0} ppm on the log's from the start of the session on, which is undone"
         );
         (clock.rate != 0.0).then_some(sentence)
     };
-    rates.into_iter().zip(names).filter_map(of)
+    fit.records.clocks.iter().zip(names).filter_map(of).collect()
 }
 
 /// What differs for certain between the instruments of the first session and another. Clocks that were taken

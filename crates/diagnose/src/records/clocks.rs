@@ -71,3 +71,55 @@ impl Clocks {
         Self { drift, offsets, records: Some(records), remaining_s }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::RECORDS;
+    use crate::small_robot::driven_runs::driven;
+
+    fn found(offsets_s: &[f64]) -> Clocks {
+        Clocks::of(&[driven(offsets_s)], RECORDS.min_common_clock_offset_s)
+    }
+
+    #[test]
+    fn a_run_whose_clock_is_off_is_named_and_left_out() {
+        let Clocks { offsets, records, .. } = found(&[0.0, 0.0, 0.3, 0.0, 0.0]);
+        let [ClockOffset { runs, of }] = &offsets[..] else { panic!("one run: {offsets:?}") };
+        assert_eq!(runs.as_deref(), Some(&["run-2".to_owned()][..]));
+        // Poses are taken at hundredths of a second.
+        assert!((of.offset_s - 0.3).abs() < 0.01, "{}", of.offset_s);
+        assert_eq!(records.expect("one is off")[0].runs.len(), 4);
+    }
+
+    #[test]
+    fn a_clock_that_is_off_in_all_runs_is_set_right() {
+        let Clocks { offsets, records, remaining_s, .. } = found(&[-0.4; 4]);
+        assert_eq!((offsets.len(), offsets[0].runs.as_deref(), remaining_s), (1, None, 0.0));
+        assert!((offsets[0].of.offset_s + 0.4).abs() < 0.01, "{}", offsets[0].of.offset_s);
+        // Rejects a shift the other way: the records are then off by nothing.
+        let records = records.expect("all are off");
+        assert!(Clocks::of(&records, RECORDS.min_common_clock_offset_s).offsets.is_empty());
+        // What the fit can estimate is said to be there still.
+        let small = found(&[0.05; 4]);
+        assert!(small.offsets.is_empty() && (small.remaining_s - 0.05).abs() < 0.01, "{}", small.remaining_s);
+        // Where a fit fails with it, it is taken off; rejects the same limit for both.
+        let small = Clocks::of(&[driven(&[0.05; 4])], 0.04);
+        assert!((small.offsets[0].of.offset_s - 0.05).abs() < 0.01, "{}", small.offsets[0].of.offset_s);
+    }
+
+    #[test]
+    fn what_a_clock_gains_is_taken_off_over_the_session() {
+        let mut dataset = driven(&[0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6]);
+        for (number, run) in dataset.runs.iter_mut().enumerate() {
+            run.info.start_s = Some(100.0 * number as f64);
+        }
+        let before_s = dataset.runs[6].truth[100].t_s;
+        let of = Clocks::of(&[dataset], RECORDS.min_common_clock_offset_s);
+        assert!(of.drift.is_some_and(|drift| drift.clock.of_session), "{:?}", of.drift);
+        // Of the last run's stamps 0.6 s are taken, and a thousandth of its own.
+        let records = of.records.expect("it drifts");
+        assert!((records[0].runs[6].truth[100].t_s - (before_s - 0.61)).abs() < 0.02);
+        assert!(Clocks::of(&records, RECORDS.min_common_clock_offset_s).drift.is_none(), "nothing is left");
+    }
+}

@@ -21,7 +21,7 @@ pub(crate) struct RunClock {
     pub(crate) run: (usize, usize),
     /// By all of its measurements.
     pub(crate) whole: Option<Profile>,
-    /// By those of its parts, where it is long, each with its middle, seconds from the run's start.
+    /// By those of its parts, where it has many, each with its middle, seconds from the run's start.
     pub(crate) parts: Vec<(f64, Profile)>,
     /// When the run began on the session's clock, seconds.
     pub(crate) start_s: f64,
@@ -89,7 +89,7 @@ struct Left {
 
 impl<'r> PosePairs<'r> {
     /// Of a run that measures poses at instants between which the turns are known for any offset; `None` of
-    /// others, and of one whose log has rows that no wheel makes.
+    /// others.
     fn of(run: &'r SearchedRun<'r>, clock: Clock) -> Option<Self> {
         let log = &run.log;
         let [first_s, last_s] = known_between(&log.t_s, &log.wheels)?;

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::clock::model::Clock;
 use crate::clock::profile::RunClock;
-use crate::clock::searched_run::SearchedRun;
+use crate::clock::searched_run::{SearchedRun, count_rad};
 use crate::run_log::{RunLog, m_per_rad};
 use crate::session_check::SessionCheck;
 use crate::windows::Reading;
@@ -25,9 +25,17 @@ impl ClockSearch<'static> {
             let SessionCheck { runs, robot, .. } = SessionCheck::new(&dataset.session());
             let asked = |log: RunLog| {
                 let run = dataset.runs.iter().position(|run| run.info.id == log.id)?;
-                let drive = (m_per_rad(&robot), robot.wheel_separation_m);
-                is_asked(&dataset.runs[run])
-                    .then(|| SearchedRun::of((session, run), Cow::Owned(log), Reading::AS_IS, drive))
+                let (number, count_rad, reading) = ((session, run), count_rad(&log), Reading::AS_IS);
+                let (m_per_rad, separation_m) = (m_per_rad(&robot), robot.wheel_separation_m);
+                let log = Cow::Owned(log);
+                is_asked(&dataset.runs[run]).then_some(SearchedRun {
+                    number,
+                    log,
+                    reading,
+                    count_rad,
+                    m_per_rad,
+                    separation_m,
+                })
             };
             runs.into_iter().filter_map(asked).collect::<Vec<_>>()
         };
@@ -39,11 +47,14 @@ impl<'r> ClockSearch<'r> {
     /// One session by the drive that its windows show, if they do.
     pub(crate) fn of_session(check: &'r SessionCheck, reading: Reading, clock: Clock) -> Self {
         let shown = check.matched_at(reading, clock).and_then(|matched| matched.geometry);
-        let drive = match shown.filter(|found| !found.is_diluted) {
+        let (m_per_rad, separation_m) = match shown.filter(|found| !found.is_diluted) {
             Some(found) => (found.m_per_rad, found.separation_m),
             None => (check.m_per_rad(), check.robot.wheel_separation_m),
         };
-        let of = |(run, log): (usize, &'r RunLog)| SearchedRun::of((0, run), Cow::Borrowed(log), reading, drive);
+        let of = |(run, log): (usize, &'r RunLog)| {
+            let (number, count_rad, log) = ((0, run), count_rad(log), Cow::Borrowed(log));
+            SearchedRun { number, log, reading, count_rad, m_per_rad, separation_m }
+        };
         Self { runs: check.runs.iter().enumerate().map(of).collect() }
     }
 

@@ -21,19 +21,10 @@ pub(super) struct SearchedRun<'r> {
     pub(super) separation_m: f64,
 }
 
-impl<'r> SearchedRun<'r> {
-    /// A run by metres a radian and the separation.
-    pub(super) fn of(
-        number: (usize, usize),
-        log: Cow<'r, RunLog>,
-        reading: Reading,
-        drive: (Wheels<f64>, f64),
-    ) -> Self {
-        let count_rad = match log.count_rad {
-            0.0 => log.wheels.as_ref().map(|angles| quantum_of_angles(angles)),
-            count_rad => Wheels::both(count_rad),
-        };
-        let (m_per_rad, separation_m) = drive;
-        Self { number, log, reading, count_rad, m_per_rad, separation_m }
+/// What a count of a log stands for, radians; 0 where wheels are not counted.
+pub(super) fn count_rad(log: &RunLog) -> Wheels<f64> {
+    match log.count_rad {
+        0.0 => log.wheels.as_ref().map(|angles| quantum_of_angles(angles)),
+        count_rad => Wheels::both(count_rad),
     }
 }

@@ -53,10 +53,13 @@ pub(crate) fn matched(check: &mut SessionCheck) -> Option<Matched> {
 /// Says a rate and an offset that matter; the clock with them.
 fn said_clock(check: &mut SessionCheck, reading: Reading, as_is: Option<Explained>, best: BestClock) -> Clock {
     let drift = clock_drift(check, reading, best.clock);
-    if let Some(ClockDrift { clock, gain, at_ends_s, .. }) = drift {
-        // What a fit undoes is no error, unless no clock of a computer is off so far.
-        let is_far = clock.rate.abs() > CHECKS.max_clock_rate || at_ends_s > CHECKS.min_warned_offset_s;
-        let severity = if is_far && !clock.of_session { Severity::Error } else { Severity::Hint };
+    if let Some(ClockDrift { clock, gain, .. }) = drift {
+        let severity = match clock.rate.abs() {
+            // A fit undoes it.
+            _ if clock.of_session => Severity::Hint,
+            rate if rate > CHECKS.max_clock_rate => Severity::Error,
+            _ => Severity::Warning,
+        };
         let kind = Kind::ClockRate { rate: clock.rate, of_session: clock.of_session };
         check.problems.push(Problem::new(&kind, severity, None, probability(gain)));
         // What is left at the start of the records.
@@ -156,14 +159,26 @@ pub(crate) fn offset_gain(
     }
     let now = if reading == Reading::AS_IS { as_is } else { check.explained(reading, Clock::default()) };
     let with = check.explained(reading, clock)?;
-    let Some(now) = now else { return Some(f64::INFINITY) };
-    let gain = with.gain_over(&now);
-    (gain > CHECKS.min_gain && with.ratio_to(&now) < 0.5 * (1.0 + CHECKS.decisive_ratio)).then_some(gain)
+    now.map_or(Some(f64::INFINITY), |now| clearly_better(&with, &now))
 }
 
-/// A rate that matters, beside a clock of all runs.
+/// A drift that matters, beside a clock of all runs: over the session, or one within runs with which the
+/// wheels explain the motion clearly better. On real instruments, delays of moments look like a drift within
+/// runs.
 pub(crate) fn clock_drift(check: &SessionCheck, reading: Reading, near: Clock) -> Option<ClockDrift> {
-    ClockSearch::of_session(check, reading, near).drift(near, CHECKS.min_clock_offset_s)
+    let found = ClockSearch::of_session(check, reading, near).drift(near, CHECKS.min_clock_offset_s)?;
+    let matters = || {
+        let (now, with) = (check.explained(reading, near)?, check.explained(reading, found.clock)?);
+        let is_explained = with.unexplained.iter().all(|share| *share < CHECKS.max_left_by_fix);
+        clearly_better(&with, &now).filter(|_| is_explained)
+    };
+    (found.clock.of_session || matters().is_some()).then_some(found)
+}
+
+/// What a clock gains over another, in nats, where it explains the records clearly better.
+fn clearly_better(with: &Explained, now: &Explained) -> Option<f64> {
+    let gain = with.gain_over(now);
+    (gain > CHECKS.min_gain && with.ratio_to(now) < 0.5 * (1.0 + CHECKS.decisive_ratio)).then_some(gain)
 }
 
 /// Says how the instrument's records are to be read.

@@ -28,52 +28,31 @@ pub(crate) fn found(check: &mut SessionCheck) -> bool {
     };
     let to_wheels = |[v, by]: [f64; 2]| [(v - by) / m_per_rad.left, (v + by) / m_per_rad.right];
     let same = |rates: [f64; 2]| rates;
-    restore(check, zeros_filled, (&same, &same, Of::Rates), |rows, from, share, Better { gain, .. }| {
+    let (rates, increments) = (true, false);
+    let of_wheels = |is_rates| Recorded { is_rates, to: &same, back: &same };
+    let of_twist = |is_rates| Recorded { is_rates, to: &to_twist, back: &to_wheels };
+    restore(check, zeros_filled, of_wheels(rates), |rows, from, share, Better { gain, .. }| {
         let severity = if share > CHECKS.max_rounded_share { Severity::Error } else { Severity::Warning };
         // What a robot cannot do so often needs little of an instrument.
         let is_certain = gain > CHECKS.min_gain || (rows >= CHECKS.min_rows && gain > 0.0);
         is_certain.then_some((RecordFault::ZeroRates { from, rows, share }, severity))
     });
-    let wraps = |rows: usize, from: Place, _: f64, Better { gain, .. }: Better| {
-        (gain > CHECKS.min_gain).then_some((RecordFault::RatesWrap { from, rows }, Severity::Error))
+    let wraps = |rows: usize, from: Place, _: f64, better: Better| {
+        (better.gain > CHECKS.min_gain).then_some((RecordFault::RatesWrap { from, rows }, Severity::Error))
     };
-    if !restore(check, unwrapped, (&same, &same, Of::Rates), wraps) {
-        restore(check, unwrapped, (&to_twist, &to_wheels, Of::Rates), wraps);
+    if !restore(check, unwrapped, of_wheels(rates), wraps) {
+        restore(check, unwrapped, of_twist(rates), wraps);
     }
+    let cut = |_: usize, _: Place, share: f64, better: Better| {
+        // Of values that are rounded to the nearest step, half of it may gain by chance.
+        let is_decisive = better.gain > CHECKS.min_gain && better.ratio < CHECKS.max_cut_ratio;
+        is_decisive.then_some((RecordFault::RatesCut { share }, Severity::Error))
+    };
     // A counter loses nothing from row to row.
-    if check.runs.iter().all(|run| run.count_rad > 0.0) {
-        return false;
-    }
-    for of in [Of::Increments, Of::Rates] {
-        for (to, back) in [(&to_twist as Change<'_>, &to_wheels as Change<'_>), (&same, &same)] {
-            let is_cut = restore(check, with_halves, (to, back, of), |_, _, share, better| {
-                // Of values that are rounded to the nearest step, half of it may gain by chance.
-                let is_decisive = better.gain > CHECKS.min_gain && better.ratio < CHECKS.max_cut_ratio;
-                is_decisive.then_some((RecordFault::RatesCut { share }, Severity::Error))
-            });
-            if is_cut {
-                return true;
-            }
-        }
-    }
-    false
-}
-
-/// What is recorded of a row.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Of {
-    Rates,
-    Increments,
-}
-
-impl Of {
-    /// What increments are divided by, over a row of so many seconds.
-    fn divisor(self, row_s: f64) -> f64 {
-        match self {
-            Self::Rates => row_s,
-            Self::Increments => 1.0,
-        }
-    }
+    check.runs.iter().any(|run| run.count_rad == 0.0)
+        && [of_twist(increments), of_wheels(increments), of_twist(rates), of_wheels(rates)]
+            .into_iter()
+            .any(|recorded| restore(check, with_halves, recorded, cut))
 }
 
 /// By how many nats restored rows explain the motion better, and the ratio of what they leave of it.
@@ -83,8 +62,16 @@ struct Better {
     ratio: f64,
 }
 
-/// From rates of both wheels to what was recorded, or back.
+/// From rates or increments of both wheels to what was recorded, or back.
 type Change<'a> = &'a dyn Fn([f64; 2]) -> [f64; 2];
+
+/// Whether columns are rates or increments, and how they are found and undone.
+#[derive(Clone, Copy)]
+struct Recorded<'a> {
+    is_rates: bool,
+    to: Change<'a>,
+    back: Change<'a>,
+}
 
 /// Says what is wrong with rows, if the instrument's motion shows it, and restores them. Of the restored rows
 /// `say` is told their number, the first, their share of those in which the robot drives, and by how much
@@ -92,15 +79,16 @@ type Change<'a> = &'a dyn Fn([f64; 2]) -> [f64; 2];
 fn restore(
     check: &mut SessionCheck,
     restored: fn(&mut [Columns]) -> Vec<(usize, usize)>,
-    recorded: (Change<'_>, Change<'_>, Of),
+    recorded: Recorded<'_>,
     say: impl Fn(usize, Place, f64, Better) -> Option<(RecordFault, Severity)>,
 ) -> bool {
-    let (to, back, of) = recorded;
-    let mut columns: Vec<Columns> = check.runs.iter().map(|run| columns_of(run, to, of)).collect();
-    let rows = restored(&mut columns);
+    let mut columns: Vec<Columns> = check.runs.iter().map(|run| columns_of(run, recorded)).collect();
+    let mut rows = restored(&mut columns);
+    rows.sort_unstable();
+    rows.dedup();
     let Some(&(run, row)) = rows.first() else { return false };
     let sound = take(&mut check.runs);
-    check.runs = sound.iter().zip(&columns).map(|(run, columns)| with_columns(run, columns, back, of)).collect();
+    check.runs = sound.iter().zip(&columns).map(|(run, columns)| with_columns(run, columns, recorded)).collect();
     let then = check.explained(Reading::AS_IS, Clock::default());
     let restored = std::mem::replace(&mut check.runs, sound);
     let better = match (check.explained(Reading::AS_IS, Clock::default()), then) {
@@ -118,20 +106,20 @@ fn restore(
     true
 }
 
-fn columns_of(run: &RunLog, to: Change<'_>, of: Of) -> Columns {
+fn columns_of(run: &RunLog, recorded: Recorded<'_>) -> Columns {
     let both = |row: usize| {
-        let divisor = of.divisor(run.t_s[row + 1] - run.t_s[row]);
-        to([&run.wheels.left, &run.wheels.right].map(|angles| (angles[row + 1] - angles[row]) / divisor))
+        let divisor = if recorded.is_rates { run.t_s[row + 1] - run.t_s[row] } else { 1.0 };
+        (recorded.to)([&run.wheels.left, &run.wheels.right].map(|angles| (angles[row + 1] - angles[row]) / divisor))
     };
     let rows: Vec<[f64; 2]> = (0..run.t_s.len().saturating_sub(1)).map(both).collect();
     [0, 1].map(|number| rows.iter().map(|of| of[number]).collect())
 }
 
-fn with_columns(run: &RunLog, columns: &Columns, back: Change<'_>, of: Of) -> RunLog {
+fn with_columns(run: &RunLog, columns: &Columns, recorded: Recorded<'_>) -> RunLog {
     let mut run = run.clone();
     for (row, (first, second)) in columns[0].iter().zip(&columns[1]).enumerate() {
-        let times = of.divisor(run.t_s[row + 1] - run.t_s[row]);
-        let [left, right] = back([*first, *second]);
+        let times = if recorded.is_rates { run.t_s[row + 1] - run.t_s[row] } else { 1.0 };
+        let [left, right] = (recorded.back)([*first, *second]);
         run.wheels.left[row + 1] = run.wheels.left[row] + left * times;
         run.wheels.right[row + 1] = run.wheels.right[row] + right * times;
     }
@@ -196,8 +184,6 @@ fn with_halves(runs: &mut [Columns]) -> Vec<(usize, usize)> {
             }
         }
     }
-    rows.sort_unstable();
-    rows.dedup();
     rows
 }
 
@@ -231,8 +217,6 @@ fn unwrapped(runs: &mut [Columns]) -> Vec<(usize, usize)> {
             }
         }
     }
-    rows.sort_unstable();
-    rows.dedup();
     rows
 }
 

@@ -117,7 +117,7 @@ fn a_drift_takes_its_remainder_and_one_without_a_name_takes_nothing() {
     let datasets = [session(0, 0.0)];
     let structure = structure(&datasets, &[]);
     let clock = preflight::Clock { rate: -4e-3, ..preflight::Clock::default() };
-    let drift = ClockDrift { clock, sigma: 1e-5, gain: 50.0, at_ends_s: 0.2 };
+    let drift = ClockDrift { clock, sigma: 1e-5, gain: 50.0 };
     let of = |without: &[String], causes: Vec<Cause>| {
         let before = Finding { causes, ..mean("slip_speed", 9.0) };
         let results = StageResults { drift: Some(&drift), without, ..results(&datasets, &structure) };
