@@ -5,6 +5,7 @@
 DIR holds logs of `replay --cases 0`: `target/replay/logs/ordinary`. Each change has logs of one kind, with the truth of
 the log that was changed. A table has, for each executable, how many logs are calibrated, the root mean square of the
 errors of both wheels and the separation over their standard deviations, and that of the separation's error, per cent.
+Where one run is changed, it says in how many logs `check` names that run and the offset to 50 ms.
 """
 
 import argparse
@@ -62,6 +63,7 @@ def late_run(by_s):
         late = draws.choice(list(log.runs("truth")))
         for row in log.rows("truth"):
             row[1] = f"{float(row[1]) + by_s * (row[0] == late):.6f}"
+        return late, by_s
 
     return change
 
@@ -131,6 +133,7 @@ CHANGES = {
     "a clock that gains 100 ppm over the session": ("speeds", drift(1e-4)),
     "a clock that gains 500 ppm over the session": ("speeds", drift(5e-4)),
     "one run 0.3 s late": ("speeds", late_run(0.3)),
+    "one run 1.5 s late": ("angles", late_run(1.5)),
     "one run 5 s late": ("speeds", late_run(5.0)),
     "one run of four 5 s late": ("four-runs", late_run(5.0)),
     "received 5 ms late": ("500-ticks-a-turn", received(5e-3)),
@@ -152,6 +155,14 @@ def errors(yair, folder):
     return [(found[of]["value"] / truth[of] - 1, found[of]["sigma"] / truth[of]) for of in LENGTHS]
 
 
+def names(yair, folder, late):
+    """Whether `check` names the run that is late, and by how much."""
+    ran = subprocess.run([yair, "check", str(folder / "session"), "--json", "--quiet"], capture_output=True)
+    offsets = (of for of in json.loads(ran.stdout)["problems"] if of["id"] == "clock_offset" and of["runs"] == [late[0]])
+    size_s = [float(found[1]) for of in offsets if (found := re.search(r"the truth is ([\d.]+) s", of["sentence"]))]
+    return len(size_s) == 1 and abs(size_s[0] - late[1]) < 0.05
+
+
 def rms(values):
     return math.sqrt(sum(of * of for of in values) / max(len(values), 1))
 
@@ -162,15 +173,15 @@ def main():
     parser.add_argument("--yair", nargs="+", required=True)
     parser.add_argument("--work", type=Path, required=True)
     arguments = parser.parse_args()
-    cells = " | ".join("calibrated | RMS z: left, right, separation | separation off, %" for _ in arguments.yair)
-    print(f"| change | {cells} |\n| --- |{' ---: | --- | ---: |' * len(arguments.yair)}")
+    cells = " | ".join("calibrated | RMS z: left, right, separation | separation off, % | run named" for _ in arguments.yair)
+    print(f"| change | {cells} |\n| --- |{' ---: | --- | ---: | ---: |' * len(arguments.yair)}")
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         for number, (name, (kind, change)) in enumerate(CHANGES.items()):
             logs = [log for log in sorted(arguments.logs.iterdir()) if re.sub(r"-\d{6,}$", "", log.name) == kind]
-            folders = []
+            folders, changes = [], []
             for log in logs:
                 changed = Log(log / "training/session_0")
-                change(changed, random.Random(f"{name} {log.name}"))
+                changes.append(change(changed, random.Random(f"{name} {log.name}")))
                 folders.append(arguments.work / f"{number}" / log.name)
                 changed.write(folders[-1] / "session")
                 (folders[-1] / "answer.json").write_text((log / "answer.json").read_text())
@@ -179,7 +190,9 @@ def main():
                 found = [of for of in pool.map(lambda folder: errors(yair, folder), folders) if of]
                 z = ", ".join(f"{rms([of[k][0] / of[k][1] for of in found]):.2f}" for k in range(3)) if found else "–"
                 off = f"{100 * rms([of[2][0] for of in found]):.3f}" if found else "–"
-                row.append(f"{len(found)} of {len(logs)} | {z} | {off}")
+                late = [(folder, of) for folder, of in zip(folders, changes) if of]
+                named = sum(pool.map(lambda of: names(yair, *of), late))
+                row.append(f"{len(found)} of {len(logs)} | {z} | {off} | {f'{named} of {len(late)}' if late else ''}")
             print(f"| {name} | {' | '.join(row)} |", flush=True)
 
 

@@ -2,7 +2,7 @@
 //! extrinsics and latency where they predict held-out runs; thinning while innovations are not white.
 
 use dataset::Session;
-use preflight::{Clock, StartValues};
+use preflight::{Clock, SessionClock, StartValues};
 use rayon::prelude::*;
 
 use crate::error::{EstimationError, refuse_wrapped_counters};
@@ -58,7 +58,8 @@ impl FitSettings {
         start.drive?;
         let clock = Clock { offset_s: start.clock_offset_s.unwrap_or(0.0), ..Clock::default() };
         let ends = ConvergenceCriterion::NoiseShare(COMMON.noise_step_tolerance);
-        let mut fit = ModelFit::started(std::slice::from_ref(session), &[start], &[clock], ends, false).ok()?;
+        let clocks = [SessionClock { of_all: clock, odd_runs: start.odd_runs.clone() }];
+        let mut fit = ModelFit::started(std::slice::from_ref(session), &[start], &clocks, ends, false).ok()?;
         fit.start.body_from_sensor.theta_rad = fit.records.sensor_heading_rad(&fit.start);
         fit.columns.extend(fit.records.extrinsics());
         fit.refit(None, &mut []).ok()?;
@@ -75,8 +76,11 @@ impl FitSettings {
         refuse_wrapped_counters(sessions)?;
         let starts: Vec<StartValues> = sessions.par_iter().map(StartValues::of).collect();
         let is_taken = |clock: &Clock| clock.rate != 0.0 || clock.offset_s.abs() >= COMMON.min_start_clock_s;
-        let seen = |start: &StartValues| start.clock.filter(|clock| self.nuisances && is_taken(clock));
-        let clocks: Vec<Clock> = starts.iter().map(|start| seen(start).unwrap_or_default()).collect();
+        let seen = |start: &StartValues| SessionClock {
+            of_all: start.clock.filter(is_taken).unwrap_or_default(),
+            odd_runs: start.odd_runs.clone(),
+        };
+        let clocks: Vec<SessionClock> = if self.nuisances { starts.iter().map(seen).collect() } else { Vec::new() };
         let mut found = ModelFit::started(sessions, &starts, &clocks, ends, self.thin_displacements)?;
         found.free_extrinsics_if_rotated(if self.nuisances { &starts } else { &[] });
         found.first_fit()?;

@@ -186,8 +186,14 @@ impl Model {
     /// The instrument of a run: session and run in the order given.
     #[must_use]
     pub fn instrument(&self, run: (usize, usize)) -> Instrument {
-        let own = self.own.as_ref().and_then(|own| own.of.get(&own.grouping.group(run)));
-        own.copied().unwrap_or(self.common_instrument())
+        let common = self.common_instrument();
+        let Some(own) = &self.own else { return common };
+        let Some(of_group) = own.of.get(&own.grouping.group(run)) else { return common };
+        let of = |column: Column| if own.columns.contains(&column) { of_group } else { &common };
+        let x_m = of(Column::SensorX).body_from_sensor.x_m;
+        let y_m = of(Column::SensorY).body_from_sensor.y_m;
+        let theta_rad = of(Column::SensorTheta).body_from_sensor.theta_rad;
+        Instrument { body_from_sensor: Pose { x_m, y_m, theta_rad }, latency_s: of(Column::Latency).latency_s }
     }
 
     /// Moves the columns that a group has for itself.

@@ -240,7 +240,7 @@ impl ModelFit<'_> {
     fn part_equations(&self, run: (usize, usize), part: &Dataset) -> Result<PartEquations, EstimationError> {
         let sessions = [part.session()];
         refuse_wrapped_counters(&sessions)?;
-        let clock = self.records.clocks.get(run.0).copied().unwrap_or_default();
+        let clock = self.records.clocks.get(run.0).cloned().unwrap_or_default();
         let records = Records::relative_to(&sessions, self.prior.measurement_sigma(), &[clock], Some(&self.start))
             .belonging_to(run);
         if records.segments.is_empty() && !records.has_partial() {

@@ -9,7 +9,7 @@ use std::cell::LazyCell;
 
 use dataset::{CovarianceScale, MapDistortion, Run, RunView, Session, TruthSample};
 use kinematics::Pose;
-use preflight::Clock;
+use preflight::SessionClock;
 use rayon::prelude::*;
 use rules::Rule;
 
@@ -41,7 +41,7 @@ pub struct Records<'a> {
     pub ids: Vec<Vec<String>>,
     /// By session, the clock of poses and displacements, as far as it was seen before anything was fitted. A
     /// latency that is fitted is what is left.
-    pub clocks: Vec<Clock>,
+    pub clocks: Vec<SessionClock>,
 }
 
 impl<'a> Records<'a> {
@@ -54,7 +54,7 @@ impl<'a> Records<'a> {
     }
 
     /// The same by the clock of each session, none for sessions beyond the end; and a drive to start from.
-    pub(crate) fn started(sessions: &[Session<'a>], clocks: &[Clock], start: Option<&Model>) -> Self {
+    pub(crate) fn started(sessions: &[Session<'a>], clocks: &[SessionClock], start: Option<&Model>) -> Self {
         let stated = sessions.first().map(|session| session.truth_noise).unwrap_or_default();
         Self::relative_to(sessions, NoisePrior::of(stated).measurement_sigma(), clocks, start)
     }
@@ -63,10 +63,10 @@ impl<'a> Records<'a> {
     pub(crate) fn relative_to(
         sessions: &[Session<'a>],
         reference: [f64; 2],
-        clocks: &[Clock],
+        clocks: &[SessionClock],
         start: Option<&Model>,
     ) -> Self {
-        let clock = |session: usize| clocks.get(session).copied().unwrap_or_default();
+        let clock = |session: usize| clocks.get(session).cloned().unwrap_or_default();
         let mut records = Self { clocks: (0..sessions.len()).map(clock).collect(), ..Self::nothing() };
         records.gyro_scale_sigma = sessions.iter().find_map(|session| session.truth_noise.gyro.scale_sigma);
         records.common_scale = sessions.iter().all(has_common_scale);
@@ -74,6 +74,7 @@ impl<'a> Records<'a> {
         for (number, session) in sessions.iter().enumerate() {
             // Its noise is sought in all rows of the session.
             let gyro = LazyCell::new(|| GyroSettings::of(session, start));
+            let clock = &records.clocks[number];
             records.ids.push(session.runs.iter().map(|run| run.info().id.clone()).collect());
             let track_of = |run: &RunView<'a>| WheelAngleInterpolator::of(run, session.robot);
             let tracks: Vec<_> = session.runs.par_iter().map(track_of).collect();
@@ -87,7 +88,8 @@ impl<'a> Records<'a> {
                 let mut segments = Vec::new();
                 let Some((base, track)) = base else { return segments };
                 let start_s = run.info().start_s.unwrap_or(0.0);
-                let log_s = |stamp_s: f64| clock(number).log_s(start_s, stamp_s);
+                let Some(clock) = clock.of_run(&run.info().id) else { return segments };
+                let log_s = |stamp_s: f64| clock.log_s(start_s, stamp_s);
                 add_poses(&mut segments, base, track, run.run(), measured_poses(run, reference, log_s));
                 for poses in &mut segments {
                     let Some(nominal) = start else { continue };

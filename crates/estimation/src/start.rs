@@ -2,7 +2,7 @@
 
 use dataset::Session;
 use kinematics::{Pose, wrap_to_pi};
-use preflight::{Clock, DriveStart, StartValues};
+use preflight::{Clock, DriveStart, SessionClock, StartValues};
 
 use crate::error::EstimationError;
 use crate::model::{Column, GroupExtrinsics, Grouping, Instrument, Model};
@@ -17,7 +17,7 @@ impl<'a> ModelFit<'a> {
     pub(crate) fn started(
         sessions: &[Session<'a>],
         starts: &[StartValues],
-        clocks: &[Clock],
+        clocks: &[SessionClock],
         ends: ConvergenceCriterion,
         displacements_in_series: bool,
     ) -> Result<Self, EstimationError> {
@@ -26,7 +26,7 @@ impl<'a> ModelFit<'a> {
         let start = started(&nominal, starts);
         let records = Records::started(sessions, clocks, Some(&start));
         let mut fit = Self::of_records(sessions, records, [nominal, start], ends, displacements_in_series);
-        if clocks.iter().any(|clock| *clock != Clock::default()) {
+        if clocks.iter().any(|clock| clock.of_all != Clock::default()) {
             fit.columns.push(Column::Latency);
         }
         Ok(fit)

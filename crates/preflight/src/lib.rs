@@ -34,7 +34,7 @@ use dataset::Dataset;
 use kind::Kind;
 use rayon::prelude::*;
 
-pub use clock::{Clock, ClockDrift, ClockOffset, ClockOffsets, ClockSearch};
+pub use clock::{Clock, ClockDrift, ClockOffset, ClockOffsets, ClockSearch, SessionClock};
 pub use driven::Driven;
 pub use problem::{Problem, Severity};
 pub use problems::remedies::{Remedy, WouldDetermine};

@@ -310,6 +310,9 @@ rules::settings! {
     /// Seconds. Offsets of a run's clock are sought up to this, beside the clock of all runs.
     /// Convention: an instrument that is later than a second is another recording.
     max_offset_s: f64 = 1.0,
+    /// Seconds. The same of few runs whose clocks are not so near.
+    /// Budgeted: time; a run that is later than it is long says nothing of its clock.
+    max_far_offset_s: f64 = 20.0,
     /// Seconds. Step of the offsets that are tried.
     /// Budgeted: a parabola through three of them finds the best to a hundredth of a second.
     step_s: f64 = 0.04,

@@ -23,6 +23,7 @@ pub(crate) fn checked(dataset: &Dataset) -> SessionCheck {
         return check;
     }
     problems::run_order::found(&mut check);
+    problems::clock::odd_runs(&mut check);
     let before = check.problems.len();
     // With headings as they are read, and clocks that are one.
     let mut is_cut = is_rough || problems::wheel_changes::found(&mut check, Reading::AS_IS, Clock::default());

@@ -1,11 +1,13 @@
 //! What a fit starts from: the instrument's clock and the drive by the windows of motion, whatever is stated
 //! of the robot.
 
+use std::collections::BTreeMap;
+
 use dataset::{RunView, Session};
 use kinematics::Wheels;
 
-use crate::clock::model::Clock;
-use crate::problems::clock::{best_clock, clock_drift, offset_gain};
+use crate::clock::{Clock, ClockOffset};
+use crate::problems::clock::{best_clock, clock_drift, offset_gain, without_odd_runs};
 use crate::regression::slope;
 use crate::run_log::RunLog;
 use crate::session_check::SessionCheck;
@@ -13,10 +15,12 @@ use crate::settings::CHECKS;
 use crate::windows::Reading;
 
 /// What the windows of a session's motion say of its clock and of the drive.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct StartValues {
     /// The instrument's clock, where an offset or a rate is seen.
     pub clock: Option<Clock>,
+    /// Ids of runs that have another clock, with its offset.
+    pub odd_runs: BTreeMap<String, ClockOffset>,
     /// How late the instrument's stamps are against the log's by one offset, seconds, where it is seen.
     pub clock_offset_s: Option<f64>,
     /// The drive, where the windows determine it.
@@ -38,7 +42,8 @@ impl StartValues {
     /// Of a session, by its records as they are.
     #[must_use]
     pub fn of(session: &Session<'_>) -> Self {
-        let check = SessionCheck::new(session);
+        let mut check = SessionCheck::new(session);
+        let odd_runs = without_odd_runs(&mut check);
         let as_is = check.explained(Reading::AS_IS, Clock::default());
         let clock = best_clock(&check, Reading::AS_IS, as_is)
             .filter(|best| offset_gain(&check, Reading::AS_IS, as_is, best.clock, best.sigma_s).is_some())
@@ -59,7 +64,7 @@ impl StartValues {
                 sensor_rad: geometry.sensor_rad,
             })
         });
-        Self { clock, clock_offset_s, drive: drive.or_else(|| by_gyro(session, &check)) }
+        Self { clock, odd_runs, clock_offset_s, drive: drive.or_else(|| by_gyro(session, &check)) }
     }
 }
 

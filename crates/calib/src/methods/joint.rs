@@ -21,7 +21,7 @@ use estimation::{
 use kinematics::Pose;
 use motion_programs::Schedule;
 use nalgebra::{Matrix3, Vector3};
-use preflight::{Clock, Driven};
+use preflight::{ClockOffset, Driven, SessionClock};
 
 use crate::dead_reckoning_jacobian::{HARDLY_TURN, ON_THE_SPOT, WHEEL_HARDLY_TURNS, unobservable};
 use crate::estimate::{
@@ -277,7 +277,15 @@ fn why_not(fit: &ModelFit<'_>, direction: &Vector3<f64>) -> Option<&'static str>
 /// Runs without use, runs of which no measurement fitted, and partial measurements that are outliers.
 fn rejected(fit: &ModelFit<'_>) -> Vec<Rejected> {
     let id = |run: (usize, usize)| fit.records.ids[run.0][run.1].clone();
-    let unused = fit.records.unused.iter().map(|run| Rejected {
+    let clocks = fit.records.clocks.iter().flat_map(|clock| &clock.odd_runs);
+    let late = |(run, ClockOffset { offset_s, sigma_s, .. }): (&String, &ClockOffset)| {
+        let (size_s, way) = (offset_s.abs(), if *offset_s > 0.0 { "late" } else { "early" });
+        let why = format!("the instrument is {size_s:.3} ± {sigma_s:.3} s {way} in this run alone");
+        Rejected { run: run.clone(), why }
+    };
+    let odd: Vec<Rejected> = clocks.map(late).collect();
+    let is_other = |run: &&(usize, usize)| odd.iter().all(|of| of.run != fit.records.ids[run.0][run.1]);
+    let unused = fit.records.unused.iter().filter(is_other).map(|run| Rejected {
         run: id(*run),
         why: "it has no wheels, or fewer than two measurements of the instrument within its log".to_owned(),
     });
@@ -290,18 +298,18 @@ fn rejected(fit: &ModelFit<'_>) -> Vec<Rejected> {
         let why = format!("of its {of} partial measurements as outliers: {}; the others count", kinds.join(", "));
         Rejected { run: id(run), why }
     });
-    unused.chain(far).chain(partial).collect()
+    odd.iter().cloned().chain(unused).chain(far).chain(partial).collect()
 }
 
 /// What was taken off the stamps before the fit, in the mean of the sessions, seconds.
 fn mean_clock_s(fit: &ModelFit<'_>) -> f64 {
     let clocks = &fit.records.clocks;
-    clocks.iter().map(|clock| clock.offset_s).sum::<f64>() / clocks.len().max(1) as f64
+    clocks.iter().map(|clock| clock.of_all.offset_s).sum::<f64>() / clocks.len().max(1) as f64
 }
 
 /// Clocks that drift over their session, which was undone before the fit.
 fn clock_rates(fit: &ModelFit<'_>, names: &[&str]) -> Vec<String> {
-    let of = |(clock, name): (&Clock, &&str)| {
+    let of = |(SessionClock { of_all: clock, .. }, name): (&SessionClock, &&str)| {
         let (way, ppm) = (if clock.rate > 0.0 { "gains" } else { "loses" }, 1e6 * clock.rate.abs());
         let sentence = format!(
             "{name}: the instrument's clock {way} {ppm:.0} ppm on the log's from the start of the session on, which is undone"
@@ -314,7 +322,7 @@ fn clock_rates(fit: &ModelFit<'_>, names: &[&str]) -> Vec<String> {
 /// What differs for certain between the instruments of the first session and another. Clocks that were taken
 /// off the stamps before the fit are apart by more than any doubt.
 fn moved(fit: &ModelFit<'_>, names: &[&str]) -> Vec<String> {
-    let clock_s = |session: usize| fit.records.clocks.get(session).map_or(0.0, |clock| clock.offset_s);
+    let clock_s = |session: usize| fit.records.clocks.get(session).map_or(0.0, |clock| clock.of_all.offset_s);
     let sentence = |[first, other]: [usize; 2], what: &str| {
         let names = format!("{} and {}", names[first], names[other]);
         format!("between {names} the instrument {what}: it was mounted anew, or its clock set")
@@ -357,7 +365,7 @@ fn moved(fit: &ModelFit<'_>, names: &[&str]) -> Vec<String> {
 
 /// The instruments of groups, by the sessions' names.
 fn group_instruments(fit: &ModelFit<'_>, names: &[&str]) -> Vec<GroupInstrument> {
-    let clock_s: Vec<f64> = fit.records.clocks.iter().map(|clock| clock.offset_s).collect();
+    let clock_s: Vec<f64> = fit.records.clocks.iter().map(|clock| clock.of_all.offset_s).collect();
     let Some(own) = &fit.solution.model.own else {
         // Clocks that were apart before the fit.
         let are_apart = clock_s.iter().any(|clock_s_of| *clock_s_of != clock_s[0]);

@@ -66,3 +66,17 @@ fn an_instrument_of_its_own_follows_to_its_least_cost_and_the_cost_along_it_is_l
     assert!(OWN.iter().all(|column| sum.gradient[column.index()] == 0.0));
     assert!(OWN.iter().all(|column| sum.information.column(column.index()).amax() == 0.0));
 }
+
+/// Rejects a group that keeps the mounting of the model that it began with: a step of the mounting then
+/// changes no pass, and the fit never converges.
+#[test]
+fn regress_a_run_with_a_latency_of_its_own_has_the_mounting_of_all() {
+    let mut model = Model { own: Some(GroupExtrinsics::new(Grouping::Run, vec![Column::Latency])), ..MODEL };
+    model.advance_own((0, 0), &DVector::from_element(1, 0.02));
+    [Column::SensorX, Column::SensorY, Column::SensorTheta, Column::Latency]
+        .into_iter()
+        .for_each(|column| model.advance(column, 0.1));
+    let [own, other] = [(0, 0), (0, 1)].map(|run| model.instrument(run));
+    assert_eq!(own.body_from_sensor, other.body_from_sensor);
+    assert_eq!([own.latency_s, other.latency_s], [MODEL.latency_s + 0.02, MODEL.latency_s + 0.1]);
+}

@@ -15,5 +15,5 @@ mod searched_run;
 
 pub use drift::ClockDrift;
 pub use model::Clock;
-pub use offsets::{ClockOffset, ClockOffsets};
+pub use offsets::{ClockOffset, ClockOffsets, SessionClock};
 pub use search::ClockSearch;

@@ -3,9 +3,15 @@
 //! Each run has a profile likelihood of its offset ([`super::profile`]). Their mean is the offset of all; a
 //! run that is far from it has a clock of its own.
 
+use std::collections::BTreeMap;
+use std::iter::successors;
+
+use rayon::prelude::*;
+
 use crate::clock::model::Clock;
-use crate::clock::profile::Profile;
+use crate::clock::profile::{Profile, RunClock};
 use crate::clock::search::ClockSearch;
+use crate::clock::searched_run::SearchedRun;
 use crate::settings::CLOCKS;
 
 /// An offset of the instrument's clock: its poses are of so long before their stamps.
@@ -36,6 +42,23 @@ pub struct ClockOffsets {
     pub odd: Vec<((usize, usize), ClockOffset)>,
 }
 
+/// The clock of an instrument in the runs of a session.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SessionClock {
+    /// Of all runs but the odd ones.
+    pub of_all: Clock,
+    /// Ids of runs that have another clock, with its offset.
+    pub odd_runs: BTreeMap<String, ClockOffset>,
+}
+
+impl SessionClock {
+    /// Of a run, unless it is an odd one.
+    #[must_use]
+    pub fn of_run(&self, id: &str) -> Option<Clock> {
+        (!self.odd_runs.contains_key(id)).then_some(self.of_all)
+    }
+}
+
 /// A run's own offset.
 struct OfRun<'p> {
     run: (usize, usize),
@@ -47,8 +70,22 @@ impl ClockSearch<'_> {
     #[must_use]
     pub fn offsets(&self, near: Clock) -> Option<ClockOffsets> {
         let clocks = self.profiles(near);
+        // Where many runs have clocks of their own, none is the odd one: errors that are alike for seconds
+        // say so of any run.
+        let few = (self.runs.len() / CLOCKS.min_runs_per_odd).max(1);
+        let is_silent = |run: &&SearchedRun<'_>| clocks.iter().all(|of| of.run != run.number || of.whole.is_none());
+        let silent: Vec<&SearchedRun<'_>> = self.runs.iter().filter(is_silent).collect();
+        // Where a run begins or ends in motion, fewer of its poses tell of farther offsets.
+        let ranges_s = || successors(Some(CLOCKS.max_far_offset_s), |range_s| Some(0.5 * range_s));
+        let far_of = |run: &&SearchedRun<'_>| {
+            let mut all = ranges_s().take_while(|range_s| *range_s > CLOCKS.max_offset_s);
+            all.find_map(|range_s| RunClock::of(run, near, range_s).filter(|of| of.whole.is_some()))
+        };
+        let far: Vec<RunClock> =
+            if silent.len() > few { Vec::new() } else { silent.par_iter().filter_map(far_of).collect() };
+        let profiles = clocks.iter().chain(&far);
         let all: Vec<OfRun<'_>> =
-            clocks.iter().filter_map(|of| Some(OfRun { run: of.run, profile: of.whole.as_ref()? })).collect();
+            profiles.filter_map(|of| Some(OfRun { run: of.run, profile: of.whole.as_ref()? })).collect();
         let common_s = common_offset_s(&all)?;
         let is_odd = |of: &&OfRun<'_>| {
             let apart_s = (of.profile.offset_s - common_s).abs();
@@ -57,9 +94,6 @@ impl ClockSearch<'_> {
                 && of.profile.gain_over(common_s) > CLOCKS.min_gain
         };
         let odd: Vec<&OfRun<'_>> = all.iter().filter(is_odd).collect();
-        // Where many runs have clocks of their own, none is the odd one: errors that are alike for seconds
-        // say so of any run.
-        let few = (all.len() / CLOCKS.min_runs_per_odd).max(1);
         let odd = if odd.len() <= few { odd } else { Vec::new() };
         let own = |of: &OfRun<'_>| {
             let &Profile { offset_s, sigma_s, .. } = of.profile;
@@ -115,6 +149,10 @@ mod tests {
         let found = odd_runs(&[driven(&[0.0, 0.0, 0.3, 0.0, 0.0])]);
         // Poses are taken at hundredths of a second.
         assert!(matches!(found[..], [(2, offset_s)] if (offset_s - 0.3).abs() < 0.01), "{found:?}");
+        // Farther than profiles of all runs go; of two such runs neither is the odd one.
+        let found = odd_runs(&[driven(&[0.0, 0.0, 0.0, 2.0, 0.0])]);
+        assert!(matches!(found[..], [(3, offset_s)] if (offset_s - 2.0).abs() < 0.01), "{found:?}");
+        assert!(odd_runs(&[driven(&[0.0, 0.0, 2.0, 2.5, 0.0])]).is_empty());
     }
 
     #[test]
@@ -208,8 +246,8 @@ mod tests {
             let theta_rad = sample.theta_rad().map(|rad| rad + 2e-3 * (1.7 * number as f64).sin());
             *sample = TruthSample::new(sample.t_s, 1.02 * sample.x_m, 1.02 * sample.y_m, theta_rad);
         }
-        for clock in ClockSearch::of(&[dataset], |_| true).profiles(Clock::default()) {
-            let of = clock.whole.expect("it drives");
+        for clock in ClockSearch::of(&[dataset], |_| true).profiles(Clock::default()).iter() {
+            let of = clock.whole.as_ref().expect("it drives");
             text += &format!("{:?} {} {}\n", of.costs, of.offset_s, of.sigma_s);
         }
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/clocks.txt");

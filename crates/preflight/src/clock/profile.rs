@@ -16,6 +16,7 @@ use crate::run_log::RunLog;
 use crate::settings::CLOCKS;
 
 /// What a run's measurements say of its clock, beside one of all runs.
+#[derive(Clone)]
 pub(crate) struct RunClock {
     /// Session and run.
     pub(crate) run: (usize, usize),
@@ -28,9 +29,10 @@ pub(crate) struct RunClock {
 }
 
 impl RunClock {
-    /// Of a run whose poses are seen at the instants that a clock says; `None` where nothing compares them.
-    pub(super) fn of(run: &SearchedRun<'_>, clock: Clock) -> Option<Self> {
-        let pairs = PosePairs::of(run, clock)?;
+    /// Of a run whose poses are seen at the instants that a clock says, or by so much apart; `None` where
+    /// nothing compares them.
+    pub(super) fn of(run: &SearchedRun<'_>, clock: Clock, max_offset_s: f64) -> Option<Self> {
+        let pairs = PosePairs::of(run, clock, max_offset_s)?;
         let whole = pairs.profile(ALWAYS, 1);
         let [from_s, to_s] = [pairs.poses.first()?, pairs.poses.last()?].map(|pose| pose.t_s);
         let parts = (pairs.poses.len() / CLOCKS.min_part_poses).clamp(1, CLOCKS.parts_per_run);
@@ -70,6 +72,8 @@ const ALWAYS: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 struct PosePairs<'r> {
     run: &'r SearchedRun<'r>,
     poses: Vec<Seen>,
+    /// The largest offset that is tried, seconds.
+    max_offset_s: f64,
 }
 
 /// The profile log likelihood of a run's offset, negative, on a grid.
@@ -90,10 +94,10 @@ struct Left {
 impl<'r> PosePairs<'r> {
     /// Of a run that measures poses at instants between which the turns are known for any offset; `None` of
     /// others.
-    fn of(run: &'r SearchedRun<'r>, clock: Clock) -> Option<Self> {
+    fn of(run: &'r SearchedRun<'r>, clock: Clock, max_offset_s: f64) -> Option<Self> {
         let log = &run.log;
         let [first_s, last_s] = known_between(&log.t_s, &log.wheels)?;
-        let within = |t_s: f64| t_s - CLOCKS.max_offset_s >= first_s && t_s + CLOCKS.max_offset_s <= last_s;
+        let within = |t_s: f64| t_s - max_offset_s >= first_s && t_s + max_offset_s <= last_s;
         let seen = |of: &TruthSample| Seen {
             t_s: clock.log_s(log.start_s, of.t_s),
             x_m: of.x_m,
@@ -102,7 +106,7 @@ impl<'r> PosePairs<'r> {
         };
         let poses: Vec<Seen> = log.truth.iter().map(seen).filter(|pose| within(pose.t_s)).collect();
         let is_asked = log.continuous && poses.len() > CLOCKS.min_pairs;
-        is_asked.then_some(Self { run, poses })
+        is_asked.then_some(Self { run, poses, max_offset_s })
     }
 
     /// The profile by the measurements of one of so many parts of the run, by as large a share of the pairs;
@@ -133,7 +137,7 @@ impl<'r> PosePairs<'r> {
         let stride = apart.max(poses.len().div_ceil(most));
         let pairs = || poses.windows(apart + 1).step_by(stride).map(|pair| (pair[0], pair[apart]));
         let (count, turning) = (pairs().count() as f64, pairs().filter_map(|(a, b)| a.turn_rad(&b)).count() as f64);
-        let steps = (CLOCKS.max_offset_s / CLOCKS.step_s).round() as i32;
+        let steps = (self.max_offset_s / CLOCKS.step_s).round() as i32;
         // Below a tenth of a milliradian and of a millimetre a pair nothing distinguishes offsets, nor below
         // the rounding of the counts at its ends: where a robot turns evenly, pairs that fall alike between
         // counts at one offset fit by chance.
@@ -164,7 +168,10 @@ impl<'r> PosePairs<'r> {
             0.5 * (turning * (left.turns + turns_floor).ln() + count * (left.distances + distances_floor).ln())
         };
         let costs: Vec<f64> = left_at(&offsets_s).iter().map(cost).collect();
-        let best = (1..costs.len() - 1).min_by(|a, b| costs[*a].total_cmp(&costs[*b]))?;
+        let best = (0..costs.len()).min_by(|a, b| costs[*a].total_cmp(&costs[*b]))?;
+        if best == 0 || best + 1 == costs.len() {
+            return None;
+        }
         let (mut offset_s, mut sigma_s) = lowest(offsets_s[best], CLOCKS.step_s, &costs[best - 1..=best + 1])?;
         // Beside the best, where a parabola through steps so wide is not the profile.
         let near_s = [-1.0, 0.0, 1.0].map(|by| offset_s + by * CLOCKS.fine_step_s);

@@ -1,6 +1,7 @@
 //! The search for clocks in the runs of one or several sessions.
 
 use std::borrow::Cow;
+use std::sync::OnceLock;
 
 use dataset::{Dataset, Run};
 use rayon::prelude::*;
@@ -10,11 +11,14 @@ use crate::clock::profile::RunClock;
 use crate::clock::searched_run::{SearchedRun, count_rad};
 use crate::run_log::{RunLog, m_per_rad};
 use crate::session_check::SessionCheck;
+use crate::settings::CLOCKS;
 use crate::windows::Reading;
 
 /// Runs whose clocks are compared.
 pub struct ClockSearch<'r> {
     pub(super) runs: Vec<SearchedRun<'r>>,
+    /// Their profiles by their stamps as they are.
+    as_stamped: OnceLock<Vec<RunClock>>,
 }
 
 impl ClockSearch<'static> {
@@ -39,7 +43,7 @@ impl ClockSearch<'static> {
             };
             runs.into_iter().filter_map(asked).collect::<Vec<_>>()
         };
-        Self { runs: datasets.par_iter().enumerate().flat_map(of_session).collect() }
+        Self::of_runs(datasets.par_iter().enumerate().flat_map(of_session).collect())
     }
 }
 
@@ -55,11 +59,16 @@ impl<'r> ClockSearch<'r> {
             let (number, count_rad, log) = ((0, run), count_rad(log), Cow::Borrowed(log));
             SearchedRun { number, log, reading, count_rad, m_per_rad, separation_m }
         };
-        Self { runs: check.runs.iter().enumerate().map(of).collect() }
+        Self::of_runs(check.runs.iter().enumerate().map(of).collect())
+    }
+
+    fn of_runs(runs: Vec<SearchedRun<'r>>) -> Self {
+        Self { runs, as_stamped: OnceLock::new() }
     }
 
     /// What the runs say of their clocks beside one of all.
-    pub(super) fn profiles(&self, clock: Clock) -> Vec<RunClock> {
-        self.runs.par_iter().filter_map(|run| RunClock::of(run, clock)).collect()
+    pub(super) fn profiles(&self, clock: Clock) -> Cow<'_, [RunClock]> {
+        let of = || self.runs.par_iter().filter_map(|run| RunClock::of(run, clock, CLOCKS.max_offset_s)).collect();
+        if clock == Clock::default() { Cow::Borrowed(self.as_stamped.get_or_init(of)) } else { Cow::Owned(of()) }
     }
 }

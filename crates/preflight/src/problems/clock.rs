@@ -2,13 +2,15 @@
 //! wheels explain decisively better once it is undone.
 //! Reference: Knapp & Carter 1976 (time delay by maximum likelihood).
 
+use std::collections::BTreeMap;
+
 use crate::alignment::{BestClock, Comparison, Explained};
-use crate::clock::{Clock, ClockDrift, ClockSearch};
+use crate::clock::{Clock, ClockDrift, ClockOffset, ClockOffsets, ClockSearch};
 use crate::kind::{Kind, MirroredAxis};
 use crate::problem::{Problem, Severity, probability};
 use crate::session_check::{Matched, SessionCheck};
 use crate::settings::CHECKS;
-use crate::windows::{Measured, Reading, Window, windows};
+use crate::windows::{Measured, Reading, windows};
 
 /// Readings that are tried, the sound one first.
 const READINGS: [Reading; 4] = [
@@ -17,6 +19,28 @@ const READINGS: [Reading; 4] = [
     Reading { degrees: false, clockwise: true },
     Reading { degrees: true, clockwise: true },
 ];
+
+/// Leaves out runs whose clock is another than that of all, which may drift.
+pub(crate) fn without_odd_runs(check: &mut SessionCheck) -> BTreeMap<String, ClockOffset> {
+    let search = ClockSearch::of_session(check, Reading::AS_IS, Clock::default());
+    let drift = search.drift(Clock::default(), CHECKS.min_clock_offset_s).filter(|of| of.clock.of_session);
+    let Some(ClockOffsets { common, mut odd }) = search.offsets(drift.map_or(Clock::default(), |of| of.clock)) else {
+        return BTreeMap::new();
+    };
+    // A fit bears a smaller one, and delays of rows that hold up each other look like it.
+    odd.retain(|(_, of)| (of.offset_s - common.offset_s).abs() > CHECKS.min_warned_offset_s);
+    odd.into_iter().rev().map(|((_, run), of)| (check.runs.remove(run).id, of)).collect()
+}
+
+/// Names them, and leaves them out of the checks that follow.
+pub(crate) fn odd_runs(check: &mut SessionCheck) {
+    for (run, ClockOffset { offset_s, sigma_s, gain }) in without_odd_runs(check) {
+        let kind = Kind::ClockOffset { offset_s, sigma_s };
+        // No key shifts one run, and the others are sound.
+        let problem = Problem::new(&kind, Severity::Warning, Some(vec![run]), probability(gain));
+        check.problems.push(Problem { fix: None, ..problem });
+    }
+}
 
 /// The reading and the clock by which log and instrument go together; `None` where too few windows tell.
 pub(crate) fn matched(check: &mut SessionCheck) -> Option<Matched> {
@@ -77,33 +101,11 @@ fn said_clock(check: &mut SessionCheck, reading: Reading, as_is: Option<Explaine
                 _ => Severity::Hint,
             };
             let kind = Kind::ClockOffset { offset_s, sigma_s: best.sigma_s };
-            let apart = runs_apart(check, reading, clock);
-            if !apart.is_empty() {
-                // A fit leaves out what does not belong, and the others are sound.
-                let of_runs = Problem::new(&kind, severity.max(Severity::Warning), Some(apart), probability(gain));
-                check.problems.push(Problem { fix: None, ..of_runs });
-                return Clock::default();
-            }
             check.problems.push(Problem::new(&kind, severity, None, probability(gain)));
             clock
         }
         None => drift.map_or(Clock::default(), |drift| drift.clock),
     }
-}
-
-/// The runs that a clock is of, where it is of no more than half of them and others are without it.
-fn runs_apart(check: &SessionCheck, reading: Reading, clock: Clock) -> Vec<String> {
-    let (windows, measured) = windows(&check.runs, reading, CHECKS.max_windows);
-    let gain = |run: usize| {
-        let own: Vec<Window> = windows.iter().filter(|window| window.run == run).copied().collect();
-        let of_run = Comparison { windows: &own, measured, runs: &check.runs, m_per_rad: check.m_per_rad() };
-        let [without, with] = [Clock::default(), clock].map(|clock| of_run.at(clock));
-        without.zip(with).map_or(0.0, |(without, with)| with.gain_over(&without))
-    };
-    let gains: Vec<f64> = (0..check.runs.len()).map(gain).collect();
-    let own: Vec<usize> = (0..gains.len()).filter(|run| gains[*run] > CHECKS.min_gain).collect();
-    let others = gains.iter().filter(|gain| **gain < -CHECKS.min_gain).count();
-    if others < own.len() { Vec::new() } else { own.iter().map(|run| check.runs[*run].id.clone()).collect() }
 }
 
 /// The reading that the wheels explain decisively better than the sound one.
