@@ -23,7 +23,7 @@ const READINGS: [Reading; 4] = [
 /// Leaves out runs whose clock is another than that of all, which may drift.
 pub(crate) fn without_odd_runs(check: &mut SessionCheck) -> BTreeMap<String, ClockOffset> {
     let search = ClockSearch::of_session(check, Reading::AS_IS, Clock::default());
-    let drift = search.drift(Clock::default(), CHECKS.min_clock_offset_s).filter(|of| of.clock.of_session);
+    let drift = search.drift(Clock::default(), CHECKS.min_clock_offset_s);
     let Some(ClockOffsets { common, mut odd }) = search.offsets(drift.map_or(Clock::default(), |of| of.clock)) else {
         return BTreeMap::new();
     };
