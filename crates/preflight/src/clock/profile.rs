@@ -118,12 +118,11 @@ impl<'r> PosePairs<'r> {
         let poses = &self.poses[of_part];
         let (mut found, mut apart) = (None, 1);
         while poses.len() > CLOCKS.min_pairs * apart {
-            let Some((profile, unexplained)) = self.profile_of(poses, apart, CLOCKS.max_pairs / parts) else {
-                break;
-            };
-            found = (unexplained < CLOCKS.max_unexplained).then_some(profile);
-            if unexplained < CLOCKS.unexplained {
-                break;
+            if let Some((profile, unexplained)) = self.profile_of(poses, apart, CLOCKS.max_pairs / parts) {
+                found = (unexplained < CLOCKS.max_unexplained).then_some(profile);
+                if unexplained < CLOCKS.unexplained {
+                    break;
+                }
             }
             apart *= 2;
         }
