@@ -7,7 +7,7 @@ use std::path::Path;
 use crate::support::real_data::real_data;
 use crate::support::succeed;
 use calib::methods::joint::Joint;
-use calib::{Calibration, Method, Parameter, Rejected, compare};
+use calib::{Calibration, Method, Parameter, compare};
 use dataset::import::importer;
 use dataset::{Dataset, Displacement, TruthSample};
 use estimation::Column;
@@ -350,20 +350,6 @@ fn sessions_and_runs_may_have_an_instrument_of_their_own() {
             "{found:?}"
         );
     }
-}
-
-/// Profiles of a run of ten seconds find its clock to a few milliseconds; a tenth of a second is another
-/// motion.
-#[test]
-fn a_run_that_is_seconds_late_is_left_out_and_the_reason_says_so() {
-    let (mut dataset, truth) = drive(&motion_capture(mix(), Pose::IDENTITY), 31);
-    dataset.runs[1].truth.iter_mut().for_each(|sample| sample.t_s += 2.5);
-    let found = calibrated(&dataset);
-    let [Rejected { run, why }] = &found.runs_rejected[..] else { panic!("one run: {:?}", found.runs_rejected) };
-    let late_s: f64 = why.split_whitespace().find_map(|word| word.parse().ok()).expect("a size");
-    assert!(*run == dataset.runs[1].info.id && (late_s - 2.5).abs() < 0.02 && why.contains("late"), "{run}: {why}");
-    assert_eq!(found.runs_used, dataset.runs.len() - 1);
-    within_its_sigmas(&found, &truth);
 }
 
 /// Each length within 5 of its standard deviations: twice in a million by chance.
